@@ -1,0 +1,1 @@
+"""The cockpit's rooms. Pure rooms first, the shell last; read `backend.pipeline.step` first."""

@@ -1,0 +1,1 @@
+"""Distances between bodies: python-fcl, decided by an exact second solver."""

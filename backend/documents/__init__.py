@@ -1,0 +1,1 @@
+"""The JSON documents that people script against: read, written and described by a schema."""

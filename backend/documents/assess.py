@@ -1,0 +1,220 @@
+"""One set of machine states, judged once: what `cockpit assess` prints, for checks from outside."""
+
+from __future__ import annotations
+
+from itertools import combinations, permutations
+from typing import Any
+
+import numpy as np
+
+from backend.collision.closest import ClosePairs, all_pairs, closest_pairs
+from backend.cspace.sun_images import sun_image
+from backend.cspace.sun_pose import sun_pose
+from backend.documents.state import (
+    MachineStateDocument,
+    StateDocument,
+    joint_vector,
+    velocity_vector,
+)
+from backend.errors import InputError
+from backend.fusion.crs import SiteFrame
+from backend.fusion.pose import FusedPose, Validity
+from backend.fusion.samples import Fix
+from backend.machine.model import Machine
+from backend.pipeline.images import SunParameters, pair_key
+from backend.pipeline.place import base_transform, place
+from backend.pipeline.records import Body3D
+from backend.spatial.boxes import Boxes
+from backend.spatial.types import Array
+
+
+def assess(
+    state: StateDocument,
+    machines: dict[str, Machine],
+    frame: SiteFrame | None,
+    sun: SunParameters,
+    every_pair: bool = False,
+    where: str = "state",
+) -> dict[str, Any]:
+    """Bodies, end-points, closest distances and Sun's sets of one state document.
+
+    machines: the description of every machine of the document. Coordinates of the result are in
+    the frame of the document's positions [m]; distances are of bodies as built. Raises InputError.
+    """
+    origin = _origin(state, frame)
+    poses = {
+        name: _pose(name, document, machines[name], state.time, origin, where)
+        for name, document in state.machines.items()
+    }
+    placed = {
+        name: place(machines[name], pose.joints, base_transform(pose))
+        for name, pose in poses.items()
+    }
+    return {
+        "time": state.time,
+        "frame": state.frame,
+        "machines": {name: _machine(machines[name], placed[name], origin) for name in placed},
+        "closest": _closest(machines, placed, origin, every_pair),
+        "obstacles": _obstacles(state, machines, placed, origin),
+        "sun": {
+            pair_key(own, partner): _sun(machines, poses, own, partner, sun, origin)
+            for own, partner in permutations(poses, 2)
+        },
+    }
+
+
+def _origin(state: StateDocument, frame: SiteFrame | None) -> Array:
+    """What is subtracted from the document's positions, so that arithmetic is on small numbers."""
+    if state.frame == "site":
+        return np.zeros(3)
+    if frame is not None:
+        return np.array(frame.origin)
+    first = next(iter(state.machines.values()))
+    return np.array([np.floor(first.position[0]), np.floor(first.position[1]), 0.0])
+
+
+def _pose(
+    name: str,
+    document: MachineStateDocument,
+    machine: Machine,
+    time: float,
+    origin: Array,
+    where: str,
+) -> FusedPose:
+    field = f"{where}: machines.{name}"
+    position = np.array(document.position) - origin
+    if float(np.abs(position).max()) > 1e6:
+        raise InputError(
+            f"{field}.position is {list(document.position)}; allowed is within 1000 km of the "
+            "site's origin, in the site's projected CRS (or give the frame as site)."
+        )
+    return FusedPose(
+        machine=name,
+        time=time,
+        validity=Validity.VALID,
+        reasons=(),
+        position=position,
+        yaw=document.yaw,
+        pitch=document.pitch,
+        roll=document.roll,
+        joints=joint_vector(machine, document.joints, f"{field}.joints"),
+        joint_velocities=velocity_vector(
+            machine, document.joint_velocities, f"{field}.joint_velocities"
+        ),
+        base_velocity=np.zeros(3),
+        sigma_position=document.sigma.position,
+        sigma_yaw=document.sigma.yaw,
+        sigma_joints=document.sigma.joints,
+        fix=Fix.RTK_FIXED,
+        streams={},
+        clock_offset=None,
+    )
+
+
+def _machine(machine: Machine, body: Body3D, origin: Array) -> dict[str, Any]:
+    boxes = body.boxes
+    return {
+        "model": machine.name,
+        "bodies": [
+            {
+                "name": machine.body_names[k],
+                "link": machine.part_of_body(k),
+                "center": (boxes.centers[k] + origin).tolist(),
+                "rotation": boxes.rotations[k].tolist(),
+                "half_extents": boxes.half_extents[k].tolist(),
+            }
+            for k in range(len(boxes))
+        ],
+        "end_point": (body.end_point + origin).tolist(),
+        "swing_center": (body.swing_center + origin).tolist(),
+        "azimuth": body.azimuth,
+        "reach": body.reach,
+        "max_reach": machine.max_reach,
+        "self_pairs": [
+            [machine.body_names[i], machine.body_names[j]] for i, j in machine.self_pairs
+        ],
+        "assumptions": list(machine.assumptions),
+    }
+
+
+def _closest(
+    machines: dict[str, Machine], placed: dict[str, Body3D], origin: Array, every_pair: bool
+) -> list[dict[str, Any]]:
+    rows = []
+    for a, b in combinations(placed, 2):
+        boxes_a, boxes_b = placed[a].boxes, placed[b].boxes
+        found = all_pairs(boxes_a, boxes_b) if every_pair else closest_pairs(boxes_a, boxes_b)
+        names_a = [f"{a}:{name}" for name in machines[a].body_names]
+        names_b = [f"{b}:{name}" for name in machines[b].body_names]
+        rows += _rows(found, names_a, names_b, origin, len(found.distance) if every_pair else 1)
+    return rows
+
+
+def _obstacles(
+    state: StateDocument, machines: dict[str, Machine], placed: dict[str, Body3D], origin: Array
+) -> list[dict[str, Any]]:
+    """The closest body of every machine to every obstacle of the document."""
+    rows = []
+    for obstacle in state.obstacles:
+        box = Boxes(
+            np.array([obstacle.center]) - origin,
+            np.array([obstacle.rotation]),
+            np.array([obstacle.half_extents]),
+        )
+        for name, body in placed.items():
+            names = [f"{name}:{part}" for part in machines[name].body_names]
+            found = closest_pairs(body.boxes, box)
+            rows += _rows(found, names, [f"obstacle:{obstacle.name}"], origin, 1)
+    return rows
+
+
+def _rows(
+    found: ClosePairs, names_a: list[str], names_b: list[str], origin: Array, count: int
+) -> list[dict[str, Any]]:
+    return [
+        {
+            "a": names_a[found.index[k, 0]],
+            "b": names_b[found.index[k, 1]],
+            "distance": float(found.distance[k]),
+            "points": (found.points[k] + origin).tolist(),
+        }
+        for k in range(count)
+    ]
+
+
+def _sun(
+    machines: dict[str, Machine],
+    poses: dict[str, FusedPose],
+    own: str,
+    partner: str,
+    parameters: SunParameters,
+    origin: Array,
+) -> dict[str, Any]:
+    """Sun's sets with partner as the obstacle A and own as B."""
+    b, a = sun_pose(machines[own], poses[own]), sun_pose(machines[partner], poses[partner])
+    image = sun_image(
+        a, b, machines[own].max_reach, parameters.eta, parameters.m, parameters.n
+    )
+    now = image.current
+    return {
+        "eta": image.eta,
+        "m": image.m,
+        "n": image.n,
+        "warning_zone": (image.zone + origin[:2]).tolist(),
+        "theta": image.theta.tolist(),
+        "d": image.d.tolist(),
+        "beta": image.joints.beta.tolist(),
+        "boom": image.joints.boom.tolist(),
+        "stick": image.joints.stick.tolist(),
+        "bucket": image.joints.bucket.tolist(),
+        "current": {
+            "theta": now.theta,
+            "d": now.d,
+            "boom": now.boom,
+            "stick": now.stick,
+            "bucket": now.bucket,
+            "collides": now.collides,
+            "in_zone": now.in_zone,
+            "zone_distance": now.zone_distance,
+        },
+    }

@@ -1,0 +1,7 @@
+"""Errors that a person can mend: one clear sentence each."""
+
+from __future__ import annotations
+
+
+class InputError(Exception):
+    """Bad input: says the file, the field, the value and what is allowed. The program exits with 2."""

@@ -1,0 +1,1 @@
+"""Sensor streams to one pose per machine, with covariance, age and validity."""

@@ -1,0 +1,181 @@
+"""Samples to buffer entries; what cannot be true becomes None."""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from backend.fusion.rig import Rig
+from backend.fusion.samples import (
+    AttitudeSample,
+    Fix,
+    FixSample,
+    HeadingSample,
+    JointSample,
+    ProjectedSample,
+)
+from backend.spatial.angles import wrap
+from backend.spatial.types import Array
+
+MAX_STAMP = 1e11  # [s], some 3,000 years
+MAX_JOINT_RATE = 10.0  # [rad/s]
+MOST_HEADING = 1000.0  # more turns than this are nonsense [rad]
+MAX_RATE = 50.0  # of an IMU [rad/s]
+MAX_DISTANCE = 1e5  # from the site's origin [m]
+MAX_VARIANCE = 1e6  # [m^2, rad^2]
+
+
+class Entry(NamedTuple):
+    """One accepted sample. stamp: source clock; arrival: local clock [s].
+
+    value, velocity: joints [rad, rad/s] (value NaN where a joint is not published, velocity empty
+    when unknown), position [m], heading [rad], or IMU quaternion (w, x, y, z) and rate [rad/s].
+    sigma: [m] or [rad], of one axis.
+    """
+
+    stamp: float
+    arrival: float
+    value: tuple[float, ...]
+    velocity: tuple[float, ...]
+    sigma: float
+    fix: Fix = Fix.NONE
+
+
+def joints(rig: Rig, sample: JointSample) -> Entry | None:
+    """All joints, or at least the swing (IMUs then give the others); further names are ignored.
+
+    None when the swing is missing, a name comes twice, lengths disagree, a value is not finite, is
+    more than half a radian beyond the joint's limits or turns faster than 10 rad/s.
+    """
+    columns = _columns(sample.names, rig.columns, len(rig.continuous))
+    n = len(sample.names)
+    if (
+        columns is None
+        or sample.position.shape != (n,)
+        or sample.velocity.shape not in ((n,), (0,))
+    ):
+        return None
+    position, velocity = sample.position.tolist(), sample.velocity.tolist()
+    values, rates = [], []
+    for column, low, high in zip(columns, rig.low, rig.high, strict=True):
+        if column < 0:
+            values.append(math.nan)
+            rates.append(math.nan)
+            continue
+        value = position[column]
+        if not low <= value <= high:  # false for NaN, too
+            return None
+        values.append(value)
+        if velocity:
+            rate = velocity[column]
+            if not abs(rate) <= MAX_JOINT_RATE:
+                return None
+            rates.append(rate)
+    known = tuple(rates) if velocity else ()
+    return Entry(sample.stamp, sample.arrival, tuple(values), known, rig.config.sigma_joints)
+
+
+@lru_cache(maxsize=256)
+def _columns(
+    names: tuple[str, ...], known: tuple[tuple[str, int], ...], n: int
+) -> tuple[int, ...] | None:
+    """For every joint its column in `names` (-1 where it is missing); None if they do not fit."""
+    index = dict(known)
+    columns = [-1] * n
+    for column, name in enumerate(names):
+        joint = index.get(name)
+        if joint is None:
+            continue
+        if columns[joint] >= 0:
+            return None
+        columns[joint] = column
+    return tuple(columns) if columns[0] >= 0 else None
+
+
+def fix(rig: Rig, sample: FixSample) -> Entry | None:
+    """A receiver's position; None when not on Earth, far from the site, or badly covariant."""
+    on_earth = (
+        abs(sample.latitude) <= 90.0
+        and abs(sample.longitude) <= 360.0
+        and -1000.0 <= sample.altitude <= 10000.0
+    )
+    if not on_earth or sample.fix is Fix.NONE:
+        return None
+    position = rig.frame.from_geodetic(sample.latitude, sample.longitude, sample.altitude)
+    sigma = _sigma(sample.covariance)
+    if sigma is None:
+        return None
+    sigma = max(sigma or rig.config.default_sigma[sample.fix], rig.config.least_sigma[sample.fix])
+    return _placed(sample.stamp, sample.arrival, position, sigma, sample.fix)
+
+
+def projected(rig: Rig, sample: ProjectedSample) -> Entry | None:
+    """A position in the site's CRS. It carries no fix type: its sigma stands for one.
+
+    Up to 0.05 m (or unknown) counts as RTK fixed, up to 0.5 m as RTK float, above as single.
+    """
+    if sample.position.shape != (3,):
+        return None
+    sigma = _sigma(sample.covariance)
+    if sigma is None:
+        return None
+    kind = Fix.RTK_FIXED if sigma <= 0.05 else Fix.RTK_FLOAT if sigma <= 0.5 else Fix.SINGLE
+    sigma = sigma or rig.config.default_sigma[Fix.RTK_FIXED]
+    return _placed(
+        sample.stamp, sample.arrival, rig.frame.from_projected(sample.position), sigma, kind
+    )
+
+
+def heading(rig: Rig, sample: HeadingSample) -> Entry | None:
+    """A heading; a negative variance is ROS's sign for "no orientation" and gives None."""
+    if not abs(sample.heading) <= MOST_HEADING or not 0.0 <= sample.variance <= MAX_VARIANCE:
+        return None
+    sigma = math.sqrt(sample.variance) or rig.config.sigma_heading
+    return Entry(sample.stamp, sample.arrival, (float(wrap(sample.heading)),), (), sigma)
+
+
+def attitude(rig: Rig, sample: AttitudeSample) -> Entry | None:
+    """An IMU's orientation; None for an unknown link or a quaternion far from unit length."""
+    known = sample.link in rig.imus and 0.0 <= sample.variance <= MAX_VARIANCE
+    if not known or sample.orientation.shape != (4,) or sample.rate.shape != (3,):
+        return None
+    q, rate = sample.orientation.tolist(), sample.rate.tolist()
+    length = math.hypot(*q)
+    if not 0.9 <= length <= 1.1 or not all(abs(w) <= MAX_RATE for w in rate):
+        return None
+    sigma = math.sqrt(sample.variance) or rig.config.sigma_tilt
+    value = tuple(component / length for component in q)
+    return Entry(sample.stamp, sample.arrival, value, tuple(rate), sigma)
+
+
+def timely(stamp: float, arrival: float) -> bool:
+    """Whether both times are numbers that a clock could show."""
+    return abs(stamp) < MAX_STAMP and abs(arrival) < MAX_STAMP
+
+
+def _sigma(covariance: Array) -> float | None:
+    """Standard deviation along the worst axis [m], 0 when unknown; None when it is no covariance.
+
+    The worst axis rather than a 2-D rms (which is the root of a sum over two axes, 41 % more than
+    one axis has): one number that bounds every direction, height included.
+    """
+    if covariance.shape != (3, 3):
+        return None
+    if not np.abs(covariance).max() <= MAX_VARIANCE:
+        return None
+    if not covariance.any():
+        return 0.0
+    eigenvalues = np.linalg.eigvalsh(covariance)
+    if eigenvalues[0] < -1e-9 or eigenvalues[2] <= 0.0:
+        return None
+    return math.sqrt(eigenvalues[2])
+
+
+def _placed(stamp: float, arrival: float, position: Array, sigma: float, kind: Fix) -> Entry | None:
+    east, north, up = position.tolist()
+    if not max(abs(east), abs(north), abs(up)) <= MAX_DISTANCE:
+        return None
+    return Entry(stamp, arrival, (east, north, up), (), sigma, kind)

@@ -1,0 +1,1 @@
+"""Excavators: description (URDF and sidecar), kinematics and bodies."""

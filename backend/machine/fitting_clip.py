@@ -1,0 +1,83 @@
+"""Cutting triangles at planes and boxes, and sampling them: exact pieces, nothing lost at a cut."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from backend.spatial.types import Array, IntArray
+
+AREA_EPS = 1e-12  # pieces thinner than this [m^2] are dropped when both sides keep their corners
+
+
+def clip(triangles: Array, normal: Array, offset: float) -> Array:
+    """The pieces of triangles (n, 3, 3) where normal . p <= offset, as triangles (m, 3, 3).
+
+    A triangle that the plane crosses becomes one or two triangles (Sutherland and Hodgman 1974
+    for one plane and three corners). Triangles lying in the plane stay.
+    """
+    d = triangles @ normal - offset
+    inside = d <= 0.0
+    count = inside.sum(axis=1)
+    pieces = [triangles[count == 3]]
+    for k in (1, 2):
+        rows = np.flatnonzero(count == k)
+        if not len(rows):
+            continue
+        # Turn each triangle so that its lone corner (inside for k=1, outside for k=2) comes first.
+        lone = inside[rows] if k == 1 else ~inside[rows]
+        order = (np.argmax(lone, axis=1)[:, None] + np.arange(3)) % 3
+        t = np.take_along_axis(triangles[rows], order[:, :, None], axis=1)
+        s = np.take_along_axis(d[rows], order, axis=1)
+        ab = _crossing(t[:, 0], t[:, 1], s[:, 0], s[:, 1])
+        ac = _crossing(t[:, 0], t[:, 2], s[:, 0], s[:, 2])
+        if k == 1:
+            pieces.append(np.stack([t[:, 0], ab, ac], axis=1))
+        else:
+            pieces.append(np.stack([ab, t[:, 1], t[:, 2]], axis=1))
+            pieces.append(np.stack([ab, t[:, 2], ac], axis=1))
+    return np.concatenate(pieces)
+
+
+def outside_box(triangles: Array, R: Array, low: Array, high: Array) -> Array:
+    """The pieces of triangles (n, 3, 3) outside the box {p: low <= R^T p <= high}, (m, 3, 3)."""
+    rest, pieces = triangles, []
+    for axis in range(3):
+        for normal, offset in ((R[:, axis], high[axis]), (-R[:, axis], -low[axis])):
+            if not len(rest):
+                break
+            d = rest @ normal - offset
+            beyond = d.max(axis=1) > 0.0
+            if beyond.any():
+                pieces.append(clip(rest[beyond], -normal, -offset))
+                rest = np.concatenate([rest[~beyond], clip(rest[beyond], normal, offset)])
+    return np.concatenate(pieces) if pieces else triangles[:0]
+
+
+def sample(triangles: Array, spacing: float) -> Array:
+    """Points (m, 3) on triangles (n, 3, 3), corners included, none of the surface farther than
+    `spacing` [m] from one: a barycentric lattice per triangle, as fine as its longest edge asks."""
+    edges = np.linalg.norm(triangles - np.roll(triangles, 1, axis=1), axis=2).max(axis=1)
+    steps: IntArray = np.maximum(1, np.ceil(edges / spacing)).astype(np.int64)
+    points = []
+    for k in np.unique(steps):
+        i, j = np.meshgrid(np.arange(k + 1), np.arange(k + 1), indexing="ij")
+        i, j = i[i + j <= k], j[i + j <= k]
+        weights = np.stack([i, j, k - i - j], axis=1) / k
+        points.append((weights @ triangles[steps == k]).reshape(-1, 3))
+    return np.concatenate(points) if points else np.zeros((0, 3))
+
+
+def thin(points: Array, spacing: float) -> Array:
+    """One point of each occupied cube of edge `spacing` [m] (the first in the given order)."""
+    if not len(points):
+        return points
+    cell = np.floor((points - points.min(axis=0)) / spacing).astype(np.int64)
+    size = cell.max(axis=0) + 1
+    key = (cell[:, 0] * size[1] + cell[:, 1]) * size[2] + cell[:, 2]
+    return points[np.sort(np.unique(key, return_index=True)[1])]
+
+
+def _crossing(a: Array, b: Array, da: Array, db: Array) -> Array:
+    """Where the segments a-b (n, 3) meet the plane, from the signed distances of their ends."""
+    w = (da / (da - db))[:, None]
+    return np.asarray(a + w * (b - a))

@@ -1,0 +1,195 @@
+"""The description of one excavator, as every room reads it.
+
+Frames: `root` is the URDF's root link, on the ground under the swing centre, x along the tracks.
+Joint values are the URDF's own. Actuated joints come in the order of `ROLES`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from backend.spatial.boxes import Boxes
+from backend.spatial.types import AnyArray, Array, IntArray
+
+ROLES = ("swing", "boom", "stick", "bucket", "tilt", "rotate")
+"""Joint roles in the order of every joint vector; the first four are always there."""
+
+PARTS = ("tracks", "upper", "boom", "stick", "bucket", "tilt", "rotate")
+"""PARTS[k] is what joint k-1 moves; fixed links belong to the part that carries them."""
+
+
+@dataclass(frozen=True)
+class Joint:
+    """One actuated revolute joint. Angles [rad], rates [rad/s], accelerations [rad/s^2]."""
+
+    role: str
+    name: str  # the URDF's
+    lower: float  # -inf when continuous
+    upper: float  # +inf when continuous
+    max_velocity: float
+    max_acceleration: float
+
+    @property
+    def continuous(self) -> bool:
+        return not np.isfinite(self.lower) and not np.isfinite(self.upper)
+
+
+@dataclass(frozen=True)
+class Visual:
+    """A coloured triangle mesh in its link's frame. vertices: (n, 3) [m]; faces: (m, 3) indices."""
+
+    vertices: Array
+    faces: AnyArray
+    color: tuple[int, int, int]
+
+
+@dataclass(frozen=True)
+class Inertia:
+    """mass [kg]; com: (3,) in the link frame [m]; tensor: (3, 3) about the com [kg m^2]."""
+
+    mass: float
+    com: Array
+    tensor: Array
+
+
+@dataclass(frozen=True)
+class Link:
+    """A link; links are listed parents first.
+
+    T_parent_joint: (4, 4) of the joint frame at joint value 0; axis: (3,) unit, in the joint frame.
+    joint: index into Machine.joints, or -1 when rigidly attached.
+    """
+
+    name: str  # the URDF's
+    part: str  # one of PARTS
+    parent: int  # -1 for the root
+    T_parent_joint: Array
+    axis: Array
+    joint: int
+    inertia: Inertia | None
+    visuals: tuple[Visual, ...] = ()
+
+
+@dataclass(frozen=True)
+class SunMap:
+    """Joint values to the angles of Sun 2020, Fig. 2: positive raises, cumulative along the chain.
+
+    lengths: (l1, l2, l3, l4) [m]: swing axis to boom pivot (horizontal), boom, stick, bucket.
+    theta_k = sign_k * q_k + offset_k for boom, stick, bucket. azimuth_offset [rad]: the arm's
+    azimuth in the upper body's frame (0 for most machines).
+    """
+
+    lengths: tuple[float, float, float, float]
+    signs: tuple[float, float, float]
+    offsets: tuple[float, float, float]
+    azimuth_sign: float = 1.0
+    azimuth_offset: float = 0.0
+
+
+@dataclass(frozen=True)
+class ArmPlane:
+    """Where the arm's plane stands, for closed-form kinematics.
+
+    T_root_swing: (4, 4) at the swing joint's origin: z along the swing axis upwards, x the root's x
+    made perpendicular to it. pivot_height: boom pivot above that origin along z [m].
+    tip_lateral: bucket tip left of the plane through the swing axis [m]; constant, as the axes of
+    boom, stick and bucket are parallel.
+    """
+
+    T_root_swing: Array
+    pivot_height: float
+    tip_lateral: float
+
+
+@dataclass(frozen=True)
+class Antenna:
+    """Where a GNSS antenna sits. link: index into Machine.links; position: (3,) [m] in its frame."""
+
+    link: int
+    position: Array
+
+
+@dataclass(frozen=True)
+class Tracks:
+    """Travel of the tracks. length, gauge (centre to centre), shoe width [m]; speed [m/s]."""
+
+    length: float
+    gauge: float
+    shoe: float
+    max_speed: float
+    max_acceleration: float
+
+
+@dataclass(frozen=True)
+class Machine:
+    """One excavator. Bodies are oriented boxes, each in the frame of its link."""
+
+    name: str  # of the model: "mini", "zx200"
+    title: str
+    joints: tuple[Joint, ...]
+    links: tuple[Link, ...]
+    bodies: Boxes
+    body_names: tuple[str, ...]  # "boom/0": part and running number
+    body_links: tuple[int, ...]
+    end_link: int
+    end_point: Array  # (3,) bucket tip in the frame of links[end_link] [m]
+    sun: SunMap
+    arm: ArmPlane
+    antenna: Antenna
+    heading_of: str  # "tracks" or "upper": what the heading sensor turns with
+    heading_offset: float  # sensor heading minus the body's heading [rad]
+    tracks: Tracks
+    masses_trusted: bool
+    payload: float  # rated [kg]
+    self_pairs: tuple[tuple[int, int], ...]  # body indices that count as self-collision
+    max_reach: float  # from the swing axis, joint limits ignored (Sun) [m]
+    assumptions: tuple[str, ...] = field(default=())
+
+    @property
+    def lower(self) -> Array:
+        """(n,) [rad], -inf for continuous joints."""
+        return np.array([j.lower for j in self.joints])
+
+    @property
+    def upper(self) -> Array:
+        """(n,) [rad], +inf for continuous joints."""
+        return np.array([j.upper for j in self.joints])
+
+    @cached_property
+    def link_matrices(self) -> Array:
+        """(3, L, 4, 4): T_parent_link(q) = M[0] + sin(q) M[1] + (1 - cos(q)) M[2], Rodrigues."""
+        M = np.zeros((3, len(self.links), 4, 4))
+        for i, link in enumerate(self.links):
+            x, y, z = link.axis
+            K = np.zeros((4, 4))
+            K[:3, :3] = [[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]
+            M[:, i] = link.T_parent_joint, link.T_parent_joint @ K, link.T_parent_joint @ K @ K
+        M.setflags(write=False)
+        return M
+
+    @cached_property
+    def bounding_radius(self) -> float:
+        """Radius about the swing centre that contains every body in every posture [m]."""
+        swing = next(i for i, link in enumerate(self.links) if link.joint == 0)
+        corners = np.linalg.norm(self.bodies.corners(), axis=2).max(axis=1)
+        T_swing_root = np.linalg.norm(self.arm.T_root_swing[:3, 3])
+        radius = 0.0
+        for corner, link in zip(corners, self.body_links, strict=True):
+            chain, i = float(corner), link
+            while i >= 0 and i != swing:
+                chain += float(np.linalg.norm(self.links[i].T_parent_joint[:3, 3]))
+                i = self.links[i].parent
+            # Links below the swing joint are reached through the root instead.
+            radius = max(radius, chain + (float(T_swing_root) if i < 0 else 0.0))
+        return radius
+
+    @cached_property
+    def body_link_index(self) -> IntArray:
+        """(n,) body_links as an index array."""
+        return np.array(self.body_links, dtype=np.int64)
+
+    def part_of_body(self, index: int) -> str:
+        return self.links[self.body_links[index]].part

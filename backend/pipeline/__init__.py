@@ -1,0 +1,1 @@
+"""State and inputs to one immutable snapshot. Read `step` first."""

@@ -1,0 +1,27 @@
+"""What does not change during a run."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from backend.fusion.crs import SiteFrame
+from backend.machine.model import Machine
+from backend.safety.partner import Limits
+
+
+@dataclass(frozen=True)
+class Config:
+    """machines: every machine of the site by name; own: those that this backend answers for.
+
+    eta: configured inflation [m]; far: beyond this gap of two machines' workspaces no exact
+    distance is computed [m].
+    """
+
+    frame: SiteFrame
+    machines: dict[str, Machine]
+    labels: dict[str, str]
+    own: tuple[str, ...]
+    limits: Limits
+    eta: float
+    mode: str
+    far: float = 15.0

@@ -1,0 +1,42 @@
+"""A fused pose to bodies in the site frame."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from backend.fusion.pose import FusedPose
+from backend.machine import kinematics
+from backend.machine.model import Machine
+from backend.pipeline.records import Body3D
+from backend.spatial import rotation, transform
+from backend.spatial.types import Array
+
+
+def base_transform(pose: FusedPose) -> Array:
+    """T_site_root (4, 4)."""
+    R = rotation.from_attitude(pose.yaw, pose.pitch, pose.roll)
+    return transform.make(R, pose.position)
+
+
+def place(machine: Machine, q: Array, T_site_root: Array) -> Body3D:
+    """The machine at joint values q (n,) [rad] on a base T_site_root (4, 4)."""
+    link_poses = kinematics.link_poses(machine, q, T_site_root)
+    end_point = kinematics.end_point_of(machine, link_poses)
+    swing_center = kinematics.swing_center(machine, T_site_root)
+    return Body3D(
+        link_poses=link_poses,
+        boxes=kinematics.body_boxes(machine, link_poses),
+        end_point=end_point,
+        swing_center=swing_center,
+        azimuth=float(kinematics.azimuth(machine, q, T_site_root)),
+        reach=float(np.hypot(*(end_point - swing_center)[:2])),
+    )
+
+
+def point_jacobian(machine: Machine, body: Body3D, q: Array, index: int, point: Array) -> Array:
+    """(3, n) velocity [m/s] per joint rate of a site point (3,) that moves with body `index`."""
+    link = machine.body_links[index]
+    local = transform.apply(transform.inverse(body.link_poses[link]), point[None])[0]
+    root = machine.links[0]
+    T_site_root = body.link_poses[0] @ transform.inverse(root.T_parent_joint)
+    return kinematics.jacobian(machine, q, T_site_root, link, local)

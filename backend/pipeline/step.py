@@ -1,0 +1,143 @@
+"""One cycle: state and inputs to the next state and one immutable snapshot.
+
+No clock, no I/O: live, simulated and recorded input give the same snapshot for the same input.
+
+    samples → streams → poses at one common time → bodies → distances → concerns → alarms
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+
+from backend.fusion.fuse import common_time, fuse
+from backend.fusion.inflation import eta
+from backend.fusion.pose import FusedPose
+from backend.fusion.rig import Rig, make_rig
+from backend.fusion.samples import Sample
+from backend.fusion.streams import Streams, ingest
+from backend.pipeline.config import Config
+from backend.pipeline.place import base_transform, place
+from backend.pipeline.proximity import measure
+from backend.pipeline.records import Body3D, Health, Inputs, MachineState, Snapshot
+from backend.safety import alarms, partner
+from backend.safety.alarms import Alarm
+from backend.safety.partner import Proximity
+from backend.safety.record import Concern
+
+
+@dataclass(frozen=True)
+class State:
+    """What a cycle hands to the next. rigs: how each machine's sensors sit; all by machine."""
+
+    rigs: dict[str, Rig]
+    streams: dict[str, Streams]
+    common_time: float = -math.inf
+    alarms: tuple[Alarm, ...] = ()
+    health: Health = field(default_factory=lambda: Health({}, {}, 0, {}))
+    cycle: int = 0
+
+
+def initial(config: Config) -> State:
+    """The state before anything arrived."""
+    rigs = {name: make_rig(name, m, config.frame) for name, m in config.machines.items()}
+    return State(rigs=rigs, streams={name: Streams() for name in rigs})
+
+
+def step(state: State, inputs: Inputs, now: float, config: Config) -> tuple[State, Snapshot]:
+    """One cycle at the local time `now` [s]; `now` never runs backward between cycles."""
+    streams, strangers = _sorted_in(state, inputs.samples)
+    common = common_time(
+        ((rig, streams[name]) for name, rig in state.rigs.items()), now, state.common_time
+    )
+    machines = {
+        name: _machine_state(fuse(rig, streams[name], now, common), rig, config)
+        for name, rig in state.rigs.items()
+    }
+    pairs, close, unknown = measure(machines, config)
+    concerns = tuple(_partner(name, close, unknown, now, config) for name in config.own)
+    raised = alarms.update(state.alarms, concerns, now)
+    health = _health(state.health, inputs, strangers)
+    snapshot = Snapshot(
+        time=now,
+        state_time=common,
+        cycle=state.cycle,
+        mode=config.mode,
+        machines=machines,
+        pairs=pairs,
+        concerns=concerns,
+        alarms=raised,
+        health=health,
+    )
+    following = replace(
+        state,
+        streams=streams,
+        common_time=common,
+        alarms=raised,
+        health=health,
+        cycle=state.cycle + 1,
+    )
+    return following, snapshot
+
+
+def _sorted_in(state: State, samples: Iterable[Sample]) -> tuple[dict[str, Streams], int]:
+    """The streams after all samples, and how many samples were of no machine of the site."""
+    streams = dict(state.streams)
+    strangers = 0
+    for sample in samples:
+        rig = state.rigs.get(sample.machine)
+        if rig is None:
+            strangers += 1
+            continue
+        streams[sample.machine] = ingest(rig, streams[sample.machine], sample)
+    return streams, strangers
+
+
+def _machine_state(pose: FusedPose, rig: Rig, config: Config) -> MachineState:
+    body = _placed(pose, rig)
+    return MachineState(pose=pose, body=body, eta=eta(rig.machine, pose, config.eta))
+
+
+def _placed(pose: FusedPose, rig: Rig) -> Body3D | None:
+    """None until every needed stream was seen; a stale pose stays placed, for drawing."""
+    seen = {name: stream.received > stream.rejected for name, stream in pose.streams.items()}
+    turned = seen.get("joints") or seen.get("attitude")
+    if not (turned and seen.get("position") and seen.get("heading")):
+        return None
+    return place(rig.machine, pose.joints, base_transform(pose))
+
+
+def _partner(
+    name: str,
+    close: dict[str, list[Proximity]],
+    unknown: dict[str, str],
+    now: float,
+    config: Config,
+) -> Concern:
+    joints = len(config.machines[name].joints)
+    if name in unknown:
+        return partner.unknown(name, joints, unknown[name], now)
+    return partner.judge(name, joints, tuple(close[name]), config.limits, now)
+
+
+def _health(before: Health, inputs: Inputs, strangers: int) -> Health:
+    malformed = _added(before.malformed, inputs.malformed)
+    foreign = _added(before.foreign, inputs.foreign)
+    if strangers:
+        foreign = _added(foreign, (("unlisted machine", strangers),))
+    images = before.images
+    if inputs.images:
+        images = images | {f"{image.kind} {image.key}": image for image in inputs.images}
+    return Health(malformed, foreign, before.lost + inputs.lost, images)
+
+
+def _added(counts: dict[str, int], more: Iterable[tuple[str, int]]) -> dict[str, int]:
+    """The counts with `more` added; the same object when there is nothing to add."""
+    news = tuple(more)
+    if not news:
+        return counts
+    total = dict(counts)
+    for key, count in news:
+        total[key] = total.get(key, 0) + count
+    return total

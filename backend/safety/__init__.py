@@ -1,0 +1,1 @@
+"""Safety concerns and the arbiter: each concern returns the same record, the severest wins."""

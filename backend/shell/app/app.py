@@ -1,0 +1,178 @@
+"""The HTTP side: the page, the API, the page's websocket and the 3D view behind one origin."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlsplit
+
+from fastapi import APIRouter, FastAPI, Request, Response, WebSocket
+from fastapi.responses import FileResponse, JSONResponse
+from fastapi.staticfiles import StaticFiles
+from starlette.middleware.base import RequestResponseEndpoint
+
+from backend.fusion.pose import Validity
+from backend.pipeline.records import Snapshot
+from backend.shell.app.feed import Feed
+from backend.shell.app.models import (
+    HealthModel,
+    MachineDescriptionModel,
+    SiteModel,
+    SnapshotModel,
+)
+from backend.shell.app.wire import dumps
+from backend.shell.hub import Hub
+
+STATIC = Path(__file__).resolve().parents[3] / "static"
+
+PAGE_POLICY = (
+    "default-src 'self'; img-src 'self' data: blob:; style-src 'self'; script-src 'self'; "
+    "connect-src 'self'; frame-src 'self'; frame-ancestors 'self'; base-uri 'none'; "
+    "form-action 'self'"
+)
+
+
+@dataclass(frozen=True)
+class Sources:
+    """What the app reads. site: its document; snapshot: turns a snapshot into plain JSON.
+
+    backend: live timings; on_message: what a page asks of the views (camera, own machine).
+    """
+
+    hub: Hub
+    site: dict[str, Any]
+    snapshot: Callable[[Snapshot], dict[str, Any]]
+    backend: Callable[[], dict[str, Any]]
+    on_message: Callable[[dict[str, Any]], None]
+
+
+def create_app(sources: Sources, viewer: APIRouter | None = None) -> FastAPI:
+    """The application. viewer: routes of the 3D view, served below /view."""
+    app = FastAPI(
+        title="Excavator cockpit",
+        description="Fused poses, distances, warning zones and C-space images of a site's "
+        "excavators. SI units and radians; null where a value is unknown. An operator aid, not a "
+        "safety-rated function.",
+        docs_url="/api/docs",
+        openapi_url="/api/openapi.json",
+        redoc_url=None,
+    )
+    feed = Feed(
+        sources.hub,
+        lambda s: {
+            **sources.snapshot(s),
+            "backend": {**sources.backend(), "clients": feed.clients},
+        },
+        sources.site,
+        sources.on_message,
+    )
+    hub = sources.hub
+
+    @app.middleware("http")
+    async def headers(request: Request, call_next: RequestResponseEndpoint) -> Response:
+        response = await call_next(request)
+        response.headers["X-Content-Type-Options"] = "nosniff"
+        response.headers["Referrer-Policy"] = "no-referrer"
+        if request.url.path == "/" or request.url.path.startswith("/static"):
+            response.headers["Content-Security-Policy"] = PAGE_POLICY
+            response.headers["Cache-Control"] = "no-cache"
+        return response
+
+    @app.get("/", include_in_schema=False)
+    async def page() -> FileResponse:
+        return FileResponse(STATIC / "index.html")
+
+    @app.get("/favicon.ico", include_in_schema=False)
+    async def icon() -> Response:
+        return Response(status_code=204)
+
+    @app.get("/api/health", responses={200: {"model": HealthModel}}, tags=["state"])
+    async def health() -> Response:
+        """Whether the backend and every machine are well, and what is wrong in words."""
+        newest = hub.latest()
+        backend = {**sources.backend(), "clients": feed.clients}
+        return _json(_health(newest, backend, sources))
+
+    @app.get("/api/site", responses={200: {"model": SiteModel}}, tags=["description"])
+    async def site() -> Response:
+        """The site's frame, machines, obstacles and limits."""
+        return _json(sources.site)
+
+    @app.get(
+        "/api/machines",
+        responses={200: {"model": dict[str, MachineDescriptionModel]}},
+        tags=["description"],
+    )
+    async def machines() -> Response:
+        """Every machine's description."""
+        return _json(sources.site["machines"])
+
+    @app.get("/api/snapshot", responses={200: {"model": SnapshotModel}}, tags=["state"])
+    async def snapshot() -> Response:
+        """The newest cycle's conclusions; 503 before the first."""
+        newest = hub.latest()
+        if newest is None:
+            return JSONResponse({"detail": "no cycle has finished yet"}, status_code=503)
+        backend = {**sources.backend(), "clients": feed.clients}
+        return _json({**sources.snapshot(newest), "backend": backend})
+
+    @app.websocket("/ws")
+    async def socket(websocket: WebSocket) -> None:
+        if not same_origin(websocket):
+            await websocket.close(code=1008)
+            return
+        await websocket.accept()
+        await feed.serve(websocket)
+
+    if viewer is not None:
+        app.include_router(viewer)
+    app.mount("/static", StaticFiles(directory=STATIC), name="static")
+    return app
+
+
+def same_origin(websocket: WebSocket) -> bool:
+    """Whether the page that opens this websocket came from this server.
+
+    Browsers always send Origin; middleware for cross-site requests does not run on websockets.
+    Programs without a browser send none and are let in.
+    """
+    origin = websocket.headers.get("origin")
+    return origin is None or urlsplit(origin).netloc == websocket.headers.get("host")
+
+
+def _health(newest: Snapshot | None, backend: dict[str, Any], sources: Sources) -> dict[str, Any]:
+    machines = {} if newest is None else newest.machines
+    status = [backend["failure"]] if backend["failure"] else []
+    age = None if newest is None else time.monotonic() - newest.time
+    if age is None:
+        status.append("no cycle has finished yet")
+    elif age > 0.5:
+        status.append(f"the newest snapshot is {age:.1f} s old")
+    for state in machines.values():
+        if state.pose.validity is not Validity.VALID:
+            label = sources.site["machines"][state.pose.machine]["label"]
+            status.extend(f"{label} {reason}" for reason in state.pose.reasons)
+    counters: dict[str, Any] = {"malformed": {}, "foreign": {}, "lost": 0}
+    if newest is not None:
+        counters = {
+            "malformed": newest.health.malformed,
+            "foreign": newest.health.foreign,
+            "lost": newest.health.lost,
+        }
+    return {
+        "ok": not status,
+        "status": status,
+        "mode": sources.site["mode"],
+        "cycle": -1 if newest is None else newest.cycle,
+        "snapshot_age": age,
+        "machines": {name: state.pose.validity.value for name, state in machines.items()},
+        "backend": backend,
+        "counters": counters,
+    }
+
+
+def _json(document: Any) -> Response:
+    return Response(dumps(document), media_type="application/json")

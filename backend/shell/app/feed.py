@@ -1,0 +1,151 @@
+"""The page's websocket: every client gets the newest snapshot and images, never a queue of them."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import logging
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+from fastapi import WebSocket, WebSocketDisconnect
+
+from backend.pipeline.images import PairImage, frame_arrays
+from backend.pipeline.records import Snapshot
+from backend.shell.app.wire import encode
+from backend.shell.hub import Hub
+
+log = logging.getLogger(__name__)
+
+SNAPSHOT_PERIOD = 0.03  # at least, between two snapshots to one page [s]
+MAX_MESSAGE = 4096  # from a page [bytes]
+
+
+@dataclass
+class Frames:
+    """Encoded frames, made once for all clients. `document` turns a snapshot into plain JSON."""
+
+    hub: Hub
+    document: Callable[[Snapshot], dict[str, Any]]
+    _snapshot: tuple[int, bytes] = (-1, b"")
+    _images: dict[tuple[str, str], tuple[float, bytes]] = field(default_factory=dict)
+
+    def snapshot(self) -> tuple[int, bytes]:
+        """(cycle, frame) of the newest snapshot; cycle -1 before the first."""
+        newest = self.hub.latest()
+        if newest is not None and newest.cycle != self._snapshot[0]:
+            frame = encode({"type": "snapshot", "wall": time.time(), **self.document(newest)})
+            self._snapshot = (newest.cycle, frame)
+        return self._snapshot
+
+    def images(self) -> dict[tuple[str, str], tuple[float, bytes]]:
+        """(state_time, frame) of every image, by kind and key."""
+        for key, image in self.hub.images().items():
+            known = self._images.get(key)
+            if known is None or known[0] != image.state_time:
+                self._images[key] = (image.state_time, _image_frame(image))
+        return self._images
+
+
+def _image_frame(image: PairImage) -> bytes:
+    sun, now = image.sun, image.sun.current
+    header = {
+        "type": "sun",
+        "key": image.key,
+        "own": image.own,
+        "partner": image.partner,
+        "state_time": image.state_time,
+        "eta": sun.eta,
+        "m": sun.m,
+        "n": sun.n,
+        "max_reach": sun.b_max_reach,
+        "current": {
+            "theta": now.theta,
+            "d": now.d,
+            "boom": now.boom,
+            "stick": now.stick,
+            "bucket": now.bucket,
+            "collides": now.collides,
+            "in_zone": now.in_zone,
+            "zone_distance": now.zone_distance,
+            "in_joint_set": now.in_joint_set,
+        },
+    }
+    return encode(header, frame_arrays(image))
+
+
+class Feed:
+    """Serves one accepted websocket until it closes."""
+
+    def __init__(
+        self,
+        hub: Hub,
+        document: Callable[[Snapshot], dict[str, Any]],
+        site: dict[str, Any],
+        on_message: Callable[[dict[str, Any]], None],
+    ) -> None:
+        self._hub = hub
+        self._frames = Frames(hub, document)
+        self._site = encode({"type": "site", **site})
+        self._on_message = on_message
+        self.clients = 0
+
+    async def serve(self, socket: WebSocket) -> None:
+        self.clients += 1
+        fresh = asyncio.Event()
+        loop = asyncio.get_running_loop()
+
+        def notify() -> None:
+            with contextlib.suppress(RuntimeError):  # the loop has closed
+                loop.call_soon_threadsafe(fresh.set)
+
+        stop_listening = self._hub.listen(notify)
+        sender = asyncio.create_task(self._send(socket, fresh))
+        receiver = asyncio.create_task(self._receive(socket))
+        try:
+            done, _ = await asyncio.wait({sender, receiver}, return_when=asyncio.FIRST_COMPLETED)
+            for task in done:
+                error = task.exception()
+                if error is not None and not isinstance(
+                    error, (WebSocketDisconnect, RuntimeError, OSError)
+                ):
+                    log.error("websocket: %r", error)
+        finally:
+            stop_listening()
+            for task in (sender, receiver):
+                task.cancel()
+            await asyncio.gather(sender, receiver, return_exceptions=True)
+            self.clients -= 1
+
+    async def _send(self, socket: WebSocket, fresh: asyncio.Event) -> None:
+        await socket.send_bytes(self._site)
+        sent_cycle = -1
+        sent_images: dict[tuple[str, str], float] = {}
+        while True:
+            with contextlib.suppress(TimeoutError):
+                await asyncio.wait_for(fresh.wait(), timeout=1.0)
+            fresh.clear()
+            started = time.monotonic()
+            cycle, frame = self._frames.snapshot()
+            if cycle != sent_cycle:
+                sent_cycle = cycle
+                await socket.send_bytes(frame)
+            for key, (stamp, image) in list(self._frames.images().items()):
+                if sent_images.get(key) != stamp:
+                    sent_images[key] = stamp
+                    await socket.send_bytes(image)
+            # What arrives meanwhile waits for the next turn: the newest wins, nothing queues.
+            await asyncio.sleep(max(0.0, SNAPSHOT_PERIOD - (time.monotonic() - started)))
+
+    async def _receive(self, socket: WebSocket) -> None:
+        while True:
+            text = await socket.receive_text()
+            if len(text) > MAX_MESSAGE:
+                continue
+            with contextlib.suppress(ValueError):
+                message = json.loads(text)
+                if isinstance(message, dict):
+                    self._on_message(message)

@@ -1,0 +1,64 @@
+"""The newest snapshot and images, for any number of readers. The latest value wins."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from typing import Any
+
+from backend.pipeline.records import Snapshot
+
+
+class Hub:
+    """Thread-safe exchange between the fast loop, the image workers and all views."""
+
+    def __init__(self) -> None:
+        self._changed = threading.Condition()
+        self._snapshot: Snapshot | None = None
+        self._images: dict[tuple[str, str], Any] = {}
+        self._listeners: list[Callable[[], None]] = []
+
+    def publish(self, snapshot: Snapshot) -> None:
+        with self._changed:
+            self._snapshot = snapshot
+            self._changed.notify_all()
+            listeners = tuple(self._listeners)
+        for notify in listeners:
+            notify()
+
+    def publish_image(self, kind: str, key: str, image: Any) -> None:
+        """image: a frozen record, for example backend.cspace's image of one ordered pair."""
+        with self._changed:
+            self._images[(kind, key)] = image
+
+    def latest(self) -> Snapshot | None:
+        return self._snapshot
+
+    def wait(self, after_cycle: int, timeout: float) -> Snapshot | None:
+        """The newest snapshot past `after_cycle`, or None after `timeout` seconds."""
+        with self._changed:
+            self._changed.wait_for(
+                lambda: self._snapshot is not None and self._snapshot.cycle > after_cycle, timeout
+            )
+            newest = self._snapshot
+        return newest if newest is not None and newest.cycle > after_cycle else None
+
+    def image(self, kind: str, key: str) -> Any | None:
+        with self._changed:
+            return self._images.get((kind, key))
+
+    def images(self) -> dict[tuple[str, str], Any]:
+        with self._changed:
+            return dict(self._images)
+
+    def listen(self, notify: Callable[[], None]) -> Callable[[], None]:
+        """Call `notify` after each snapshot, from the publishing thread; returns the undo."""
+        with self._changed:
+            self._listeners.append(notify)
+
+        def stop() -> None:
+            with self._changed:
+                if notify in self._listeners:
+                    self._listeners.remove(notify)
+
+        return stop

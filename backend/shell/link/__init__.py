@@ -1,0 +1,1 @@
+"""The wire: one table of topics, ROS 2 messages in CDR, Zenoh sessions."""

@@ -1,0 +1,214 @@
+"""Everything that arrives from a site's machines, as samples in order of arrival.
+
+Zenoh's callbacks only enqueue: one slow callback would hold up every subscriber of the session.
+Decoding happens in `drain`, in the caller's thread.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import Counter, deque
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from backend.errors import InputError
+from backend.fusion.samples import ClockSample, Sample
+from backend.shell.link.codec import DecodeError, decode, decode_clock
+from backend.shell.link.messages import AgentStatus, Command, TrueState
+from backend.shell.link.session import zenoh_congestion, zenoh_priority
+from backend.shell.link.topics import Direction, key, match, topic
+
+QUEUE = 8192  # messages: 8 s of four machines at full rate
+POLL_PERIOD = 0.5  # [s] between two questions for a machine's clock
+POLL_TIMEOUT = 1.0  # [s]
+FOREIGN_KEYS = ("*/gnss/*", "*/status")  # slow streams that betray machines the site does not list
+MAX_LABELS = 100
+NOT_FOR_FUSION = ("points",)  # not decoded here
+
+
+@dataclass(frozen=True)
+class Drained:
+    """What arrived since the last `drain`.
+
+    samples: in order of arrival. malformed: (key, messages) that could not be decoded or are on no
+    known topic. foreign: messages of machines that the site does not list. lost: messages dropped
+    because the queue was full. All are counts since the last `drain`.
+    """
+
+    samples: tuple[Sample, ...]
+    malformed: tuple[tuple[str, int], ...]
+    foreign: tuple[tuple[str, int], ...]
+    lost: int
+
+
+@dataclass(frozen=True)
+class _Raw:
+    machine: str
+    suffix: str
+    payload: bytes
+    arrival: float
+
+
+class Receiver:
+    """Subscribes to the machines of a site and asks for their clocks.
+
+    machines: key prefix on the wire -> the site's name of the machine. clock: the local clock that
+    arrivals and round trips are told by [s].
+    """
+
+    def __init__(
+        self,
+        session: Any,
+        machines: Mapping[str, str],
+        clock: Callable[[], float] = time.monotonic,
+        poll_period: float = POLL_PERIOD,
+    ) -> None:
+        for prefix in machines:
+            if not prefix or any(c in prefix for c in "*$?#{} ") or prefix.strip("/") != prefix:
+                raise InputError(
+                    f"prefix: {prefix!r} is not a key prefix; allowed are names joined by '/'"
+                )
+        self._session = session
+        self._machines = dict(machines)
+        self._clock = clock
+        self._queue: deque[_Raw | ClockSample] = deque()
+        self._lock = threading.Lock()
+        self._malformed: Counter[str] = Counter()
+        self._foreign: Counter[str] = Counter()
+        self._labels: set[str] = set()
+        self._lost = 0
+        self._statuses: dict[str, AgentStatus] = {}
+        self._truths: dict[str, TrueState] = {}
+        self._closed = threading.Event()
+        self._subscribers = [
+            session.declare_subscriber(f"{prefix}/**", self._listener(prefix, name))
+            for prefix, name in self._machines.items()
+        ]
+        self._subscribers += [
+            session.declare_subscriber(keys, self._on_any) for keys in FOREIGN_KEYS
+        ]
+        self._poller = threading.Thread(
+            target=self._poll, args=(poll_period,), name="clock-poll", daemon=True
+        )
+        self._poller.start()
+
+    def drain(self) -> Drained:
+        """Everything since the last call, decoded. Call it from one thread."""
+        with self._lock:
+            raw, self._queue = self._queue, deque()
+            malformed, self._malformed = self._malformed, Counter()
+            foreign, self._foreign = self._foreign, Counter()
+            lost, self._lost = self._lost, 0
+        samples: list[Sample] = []
+        for item in raw:
+            if isinstance(item, ClockSample):
+                samples.append(item)
+                continue
+            try:
+                message = decode(item.machine, item.suffix, item.payload, item.arrival)
+            except DecodeError:
+                self._count(malformed, f"{item.machine}/{item.suffix}")
+                continue
+            if isinstance(message, AgentStatus):
+                self._statuses[item.machine] = message
+            elif isinstance(message, TrueState):
+                self._truths[item.machine] = message
+            elif not isinstance(message, Command):
+                samples.append(message)
+        return Drained(tuple(samples), tuple(malformed.items()), tuple(foreign.items()), lost)
+
+    def statuses(self) -> dict[str, AgentStatus]:
+        """The newest status of each machine's agent by the site's names, as of the last `drain`."""
+        return dict(self._statuses)
+
+    def truths(self) -> dict[str, TrueState]:
+        """The newest true state of each simulated machine, as of the last `drain`."""
+        return dict(self._truths)
+
+    def _count(self, counter: Counter[str], label: str) -> None:
+        """One more of `label`. Strangers cannot make the set of labels grow without end."""
+        text = "".join(c if c.isprintable() else "?" for c in label[:100])
+        with self._lock:
+            if text not in self._labels and len(self._labels) >= MAX_LABELS:
+                text = "others"
+            self._labels.add(text)
+            counter[text] += 1
+
+    def close(self) -> None:
+        """Stops listening and asking. Nothing is enqueued afterwards; calling again is harmless."""
+        if self._closed.is_set():
+            return
+        self._closed.set()
+        for subscriber in self._subscribers:
+            subscriber.undeclare()
+        self._poller.join(timeout=1.0)
+
+    def _listener(self, prefix: str, machine: str) -> Callable[[Any], None]:
+        skip = len(prefix) + 1
+
+        def on_sample(sample: Any) -> None:
+            arrival = self._clock()
+            self._enqueue(machine, str(sample.key_expr)[skip:], sample.payload, arrival)
+
+        return on_sample
+
+    def _enqueue(self, machine: str, suffix: str, payload: Any, arrival: float) -> None:
+        if self._closed.is_set():
+            return
+        found = match(suffix)
+        if found is not None and (
+            found[0].direction is not Direction.FROM_MACHINE or found[0].name in NOT_FOR_FUSION
+        ):
+            return  # commands of cockpits, our own among them, and clouds of points
+        if found is None or len(payload) > found[0].max_bytes:  # not worth copying
+            self._count(self._malformed, f"{machine}/{suffix}")
+            return
+        self._append(_Raw(machine, suffix, payload.to_bytes(), arrival))
+
+    def _append(self, item: _Raw | ClockSample) -> None:
+        with self._lock:
+            self._queue.append(item)
+            if len(self._queue) > QUEUE:
+                self._queue.popleft()
+                self._lost += 1
+
+    def _on_any(self, sample: Any) -> None:
+        name = str(sample.key_expr).split("/", 1)[0]
+        if name in self._machines or any(p.startswith(f"{name}/") for p in self._machines):
+            return
+        self._count(self._foreign, name)
+
+    def _poll(self, period: float) -> None:
+        while not self._closed.wait(period):
+            for prefix, name in self._machines.items():
+                try:
+                    self._ask(prefix, name)
+                except Exception:  # the session was closed under us
+                    if self._closed.is_set():
+                        return
+
+    def _ask(self, prefix: str, machine: str) -> None:
+        row = topic("clock")
+        sent = self._clock()
+
+        def on_reply(reply: Any) -> None:
+            received = self._clock()
+            if self._closed.is_set() or reply.ok is None:
+                return
+            try:
+                remote = decode_clock(reply.ok.payload.to_bytes()[: row.max_bytes])
+            except DecodeError:
+                self._count(self._malformed, f"{machine}/clock")
+                return
+            self._append(ClockSample(machine, sent, remote, received))
+
+        self._session.get(
+            key("clock", prefix),
+            on_reply,
+            timeout=POLL_TIMEOUT,
+            priority=zenoh_priority(row),
+            congestion_control=zenoh_congestion(row),
+            express=row.express,
+        )

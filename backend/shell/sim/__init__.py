@@ -1,0 +1,1 @@
+"""Simulated machines: dynamics, work cycles, radio, and the process that publishes them."""

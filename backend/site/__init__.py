@@ -1,0 +1,1 @@
+"""The site file: which machines, where, in which frame, with which limits."""

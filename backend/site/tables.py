@@ -1,0 +1,222 @@
+"""The tables of a site file, checked field by field. Degrees only here, where people edit."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+from typing import Annotated, Any, Literal, TypeAlias
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+
+from backend.machine.model import ROLES
+from backend.spatial.rotation import rz
+from backend.spatial.types import Array, frozen
+
+Vector: TypeAlias = tuple[float, float, float]
+Matrix: TypeAlias = tuple[Vector, Vector, Vector]
+Degrees: TypeAlias = Annotated[float, Field(ge=-360.0, le=360.0)]
+Tilt: TypeAlias = Annotated[float, Field(ge=-45.0, le=45.0)]
+Positive: TypeAlias = Annotated[float, Field(gt=0.0)]
+NotNegative: TypeAlias = Annotated[float, Field(ge=0.0)]
+Name: TypeAlias = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+$", max_length=64)]
+MachineName: TypeAlias = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$", max_length=32)]
+Prefix: TypeAlias = Annotated[
+    str, Field(pattern=r"^[A-Za-z0-9_-]+(/[A-Za-z0-9_-]+)*$", max_length=128)
+]
+
+
+class Table(BaseModel):
+    """One table: unknown fields, wrong types, NaN and infinities are refused."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+
+
+class Frame(Table):
+    """The site frame, see backend.fusion.crs.SiteFrame."""
+
+    epsg: int
+    origin: Vector
+    geoid_offset: float = 0.0
+    heading_reference: Literal["grid", "true"] = "grid"
+
+
+class Safety(Table):
+    """eta: configured inflation; slow_below, stop_below: p_u and p_l of Mäkinen 2021 [m]."""
+
+    eta: NotNegative = 0.10
+    slow_below: Positive = 0.8
+    stop_below: NotNegative = 0.2
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Safety:
+        if self.stop_below >= self.slow_below:
+            raise ValueError(
+                f"stop_below is {self.stop_below}; allowed is less than slow_below "
+                f"({self.slow_below})"
+            )
+        return self
+
+
+class Sun(Table):
+    """Resolution (m yaws, n lengths) and link half-width eta [m] of Sun's sets."""
+
+    m: Annotated[int, Field(ge=1, le=500)] = 50
+    n: Annotated[int, Field(ge=1, le=500)] = 50
+    eta: NotNegative = 0.1
+
+
+class Rates(Table):
+    """Rates of the two loops [Hz]."""
+
+    step_hz: Annotated[float, Field(ge=1.0, le=200.0)] = 50.0
+    image_hz: Annotated[float, Field(ge=0.1, le=50.0)] = 10.0
+
+
+class Start(Table):
+    """Where the simulation puts a machine: position in the projected CRS [m], angles [deg]."""
+
+    position: Vector
+    yaw_deg: Degrees = 0.0
+    pitch_deg: Tilt = 0.0
+    roll_deg: Tilt = 0.0
+    joints_deg: dict[str, Degrees] = Field(default_factory=dict)
+
+    @field_validator("joints_deg")
+    @classmethod
+    def _roles(cls, joints: dict[str, float]) -> dict[str, float]:
+        for role in joints:
+            if role not in ROLES:
+                raise ValueError(f'names the joint "{role}"; allowed are {", ".join(ROLES)}')
+        return joints
+
+    @property
+    def attitude(self) -> tuple[float, float, float]:
+        """Yaw, pitch, roll [rad]."""
+        return math.radians(self.yaw_deg), math.radians(self.pitch_deg), math.radians(self.roll_deg)
+
+    @property
+    def joints(self) -> dict[str, float]:
+        """Joint values by role, the URDF's own [rad]; joints that are not named are left out."""
+        return {role: math.radians(value) for role, value in self.joints_deg.items()}
+
+
+class MachineSim(Table):
+    """What a simulated machine does; `details` are the program's own fields."""
+
+    model_config = ConfigDict(extra="allow")
+
+    program: str = "hold"
+    seed: Annotated[int, Field(ge=0)] = 0
+
+    @property
+    def details(self) -> dict[str, Any]:
+        """The program's own fields, checked by the simulator."""
+        return dict(self.model_extra or {})
+
+
+class SiteMachine(Table):
+    """One machine of the site. Paths are relative to the site file's folder."""
+
+    name: MachineName
+    model: Annotated[str, Field(min_length=1)]
+    label: Annotated[str, Field(max_length=24)] = ""
+    sidecar: Annotated[str, Field(min_length=1)] | None = None
+    prefix: Prefix = ""
+    start: Start | None = None
+    sim: MachineSim = MachineSim()
+
+    @model_validator(mode="before")
+    @classmethod
+    def _named_after(cls, table: Any) -> Any:
+        """Label and prefix default to the name."""
+        if isinstance(table, dict) and isinstance(table.get("name"), str):
+            name = table["name"]
+            return {"label": name.upper().replace("_", " "), "prefix": name, **table}
+        return table
+
+
+class Hardware(Table):
+    """How simulated hardware publishes (Sun 2020, Section 5.1 and App. A). Periods, delays [s]."""
+
+    joint_period: Annotated[float, Field(ge=0.001, le=10.0)] = 0.005
+    position_period: Annotated[float, Field(ge=0.001, le=10.0)] = 0.05
+    heading_period: Annotated[float, Field(ge=0.001, le=10.0)] = 0.05
+    position_noise: NotNegative = 0.02
+    heading_noise_deg: NotNegative = 0.1
+    joint_noise_deg: NotNegative = 0.05
+    radio_period: NotNegative = 0.040
+    latency: NotNegative = 0.100
+
+
+class Obstacle(Table):
+    """A box on the site. center in the projected CRS; yaw_deg or a rotation matrix, not both."""
+
+    name: Name
+    center: Vector
+    half_extents: tuple[Positive, Positive, Positive]
+    yaw_deg: Degrees | None = None
+    rotation: Matrix | None = None
+
+    @model_validator(mode="after")
+    def _one_rotation(self) -> Obstacle:
+        if self.rotation is not None and self.yaw_deg is not None:
+            raise ValueError("gives both yaw_deg and rotation; allowed is one of them")
+        R = self.R_site_box
+        if not np.allclose(R @ R.T, np.eye(3), atol=1e-6) or np.linalg.det(R) < 0.0:
+            raise ValueError("rotation is not a rotation; allowed is an orthonormal 3x3 matrix")
+        return self
+
+    @property
+    def R_site_box(self) -> Array:
+        """(3, 3), columns are the box axes."""
+        if self.rotation is not None:
+            return frozen(self.rotation, (3, 3), "rotation")
+        return rz(math.radians(self.yaw_deg or 0.0))
+
+
+class Link(Table):
+    """Zenoh endpoints, for example "tcp/127.0.0.1:7447"."""
+
+    connect: tuple[str, ...] = ()
+    listen: tuple[str, ...] = ()
+
+
+class SiteTable(Table):
+    """A whole site file."""
+
+    name: Name
+    title: str = ""
+    frame: Frame
+    safety: Safety = Safety()
+    sun: Sun = Sun()
+    rates: Rates = Rates()
+    machine: Annotated[tuple[SiteMachine, ...], Field(min_length=1)]
+    sim: Hardware = Hardware()
+    obstacle: tuple[Obstacle, ...] = ()
+    link: Link = Link()
+
+    @model_validator(mode="after")
+    def _distinct(self) -> SiteTable:
+        _refuse_duplicates("machine", "name", [machine.name for machine in self.machine])
+        _refuse_duplicates("obstacle", "name", [obstacle.name for obstacle in self.obstacle])
+        prefixes = sorted(machine.prefix + "/" for machine in self.machine)
+        for shorter, longer in pairwise(prefixes):
+            if longer.startswith(shorter):
+                raise ValueError(
+                    f'machine has the prefixes "{shorter[:-1]}" and "{longer[:-1]}"; allowed are '
+                    "prefixes of which none lies inside another"
+                )
+        for prefix in prefixes:
+            if prefix.startswith("cockpit/"):
+                raise ValueError(
+                    'machine has the prefix "cockpit", which the cockpit itself publishes under; '
+                    "allowed is any other"
+                )
+        return self
+
+
+def _refuse_duplicates(table: str, field: str, names: list[str]) -> None:
+    for name in names:
+        if names.count(name) > 1:
+            raise ValueError(f'{table} has the {field} "{name}" twice; allowed is a unique {field}')

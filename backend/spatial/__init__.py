@@ -1,0 +1,1 @@
+"""Rotations, rigid transforms, angles and boxes, vectorised over leading axes."""

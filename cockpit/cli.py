@@ -1,0 +1,157 @@
+"""The program `cockpit`: one command for everything."""
+
+from __future__ import annotations
+
+import signal
+import sys
+import threading
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from backend.errors import InputError
+
+app = typer.Typer(
+    name="cockpit",
+    help="A cockpit for remote operators of several excavators. "
+    "An operator aid, not a certified safety function.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+
+Site = Annotated[str, typer.Option("--site", help="Shipped site's name or path of a site file.")]
+Host = Annotated[str, typer.Option(help="Address of the page; loopback unless told otherwise.")]
+Port = Annotated[int, typer.Option(help="Port of the page; 0 takes any free one.")]
+NoBrowser = Annotated[bool, typer.Option("--no-browser", help="Do not open a browser.")]
+Listen = Annotated[
+    list[str] | None, typer.Option(help="Zenoh endpoint to listen on, e.g. tcp/127.0.0.1:7447.")
+]
+Connect = Annotated[
+    list[str] | None, typer.Option(help="Zenoh endpoint to connect to: a router, another backend.")
+]
+
+
+@app.command()
+def demo(
+    site: Site = "demo",
+    host: Host = "127.0.0.1",
+    port: Port = 8000,
+    no_browser: NoBrowser = False,
+) -> None:
+    """Run a site with simulated machines, each in its own process, and open the page."""
+    from cockpit.run import run_demo
+
+    run_demo(site, host, port, open_browser=not no_browser, until=_interrupted())
+
+
+@app.command()
+def serve(
+    site: Site,
+    host: Host = "127.0.0.1",
+    port: Port = 8000,
+    no_browser: NoBrowser = False,
+    listen: Listen = None,
+    connect: Connect = None,
+    machines: Annotated[
+        str, typer.Option(help="Machines this backend answers for, e.g. left,right; default all.")
+    ] = "",
+) -> None:
+    """Run the cockpit on live machines, which publish to the Zenoh endpoint it listens on."""
+    from cockpit.run import run_serve
+
+    own = tuple(name.strip() for name in machines.split(",") if name.strip())
+    run_serve(
+        site,
+        host,
+        port,
+        open_browser=not no_browser,
+        listen=tuple(listen or ()),
+        connect=tuple(connect or ()),
+        own=own,
+        until=_interrupted(),
+    )
+
+
+@app.command()
+def sim(
+    site: Site,
+    machine: Annotated[str, typer.Option(help="Name of one machine of the site.")],
+    connect: Connect = None,
+    start_at: Annotated[
+        float | None, typer.Option(help="Epoch second at which the machine's program begins.")
+    ] = None,
+) -> None:
+    """Simulate one machine: publish as its hardware does and obey velocity commands."""
+    from cockpit.run import run_sim
+
+    run_sim(site, machine, tuple(connect or ()), start_at, until=_interrupted())
+
+
+@app.command()
+def assess(
+    state: Annotated[Path, typer.Option(help="State document (.json), or one per line (.jsonl).")],
+    site: Annotated[
+        str | None, typer.Option(help="Site of the positions' CRS; omitted: a local frame.")
+    ] = None,
+    every_pair: Annotated[
+        bool, typer.Option("--all", help="Every pair of bodies in `closest`, not only the nearest.")
+    ] = False,
+    json_: Annotated[
+        bool, typer.Option("--json", help="Print JSON; this command always does.")
+    ] = True,
+) -> None:
+    """Judge one set of machine states: bodies, distances and Sun's sets, as JSON."""
+    del json_
+    from cockpit.assess import run_assess
+
+    run_assess(state, site, every_pair)
+
+
+@app.command()
+def schema(
+    name: Annotated[str, typer.Argument(help="Document's name; without it the names are listed.")]
+    = "",
+) -> None:
+    """Print the JSON Schema of a document that the program reads or prints."""
+    from cockpit.schemas import print_schema
+
+    print_schema(name)
+
+
+@app.command()
+def bench(
+    json_: Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")] = False,
+    seconds: Annotated[
+        float, typer.Option(min=1.0, help="Length of the live measurements [s].")
+    ] = 10.0,
+) -> None:
+    """Measure speed and memory, against peers in the same run."""
+    from cockpit.bench import run_bench
+
+    run_bench(json_, seconds)
+
+
+def _interrupted() -> threading.Event:
+    """Set by Ctrl-C or SIGTERM."""
+    event = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: event.set())
+    return event
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Entry point. Mistakes of the user are one sentence and exit code 2, never a traceback."""
+    try:
+        app(args=None if arguments is None else list(arguments))
+    except InputError as error:
+        print(f"cockpit: {error}", file=sys.stderr)
+        raise SystemExit(2) from None
+    except BrokenPipeError:
+        raise SystemExit(1) from None
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,136 @@
+"""The long-running commands: demo, serve, sim."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import subprocess
+import sys
+import threading
+import time
+import webbrowser
+from collections.abc import Iterator
+
+from backend.shell.link.session import with_port
+from backend.site.site import Site, load_site
+
+LOOPBACK = "tcp/127.0.0.1:0"
+LIVE = "tcp/127.0.0.1:7447"
+SETTLE = 6.0
+"""Seconds between starting the simulated machines and the beginning of their programs."""
+
+
+def run_demo(
+    site_name: str, host: str, port: int, open_browser: bool, until: threading.Event
+) -> None:
+    """Simulated machines, one process each, and a backend, until interrupted."""
+    from cockpit.station import Options, Station
+
+    site = load_site(site_name)
+    endpoint = with_port(LOOPBACK)
+    began = [float("inf")]
+    station = Station(
+        site, Options(host, port, (endpoint,), (), (), "DEMO"), demo_began=lambda: began[0]
+    )
+    with contextlib.closing(station):
+        began[0] = time.time() + SETTLE
+        with _machines(site_name, site, endpoint, began[0]) as processes:
+            _announce(site, station.web.port, host, open_browser)
+            print(f"Simulated machines talk to {endpoint}.", flush=True)
+            gone: set[str] = set()
+            while not until.wait(0.5):
+                for name, process in processes.items():
+                    if process.poll() is not None and name not in gone:
+                        gone.add(name)
+                        print(
+                            f"{name}'s simulation ended ({process.returncode}). To restart it: "
+                            f"cockpit sim --site {site_name} --machine {name} "
+                            f"--connect {endpoint} --start-at {began[0]:.3f}",
+                            flush=True,
+                        )
+
+
+def run_serve(
+    site_name: str,
+    host: str,
+    port: int,
+    open_browser: bool,
+    listen: tuple[str, ...],
+    connect: tuple[str, ...],
+    own: tuple[str, ...],
+    until: threading.Event,
+) -> None:
+    """The cockpit on live machines, until interrupted."""
+    from cockpit.station import Options, Station
+
+    site = load_site(site_name)
+    listen = listen or site.link.listen or (() if connect or site.link.connect else (LIVE,))
+    listen = tuple(with_port(endpoint) for endpoint in listen)
+    connect = connect or site.link.connect
+    station = Station(site, Options(host, port, listen, connect, own, "LIVE"))
+    with contextlib.closing(station):
+        _announce(site, station.web.port, host, open_browser)
+        where = [f"listening on {e}" for e in listen] + [f"connected to {e}" for e in connect]
+        print(f"Machines: {', '.join(where)}.", flush=True)
+        until.wait()
+
+
+def run_sim(
+    site_name: str,
+    machine: str,
+    connect: tuple[str, ...],
+    start_at: float | None,
+    until: threading.Event,
+) -> None:
+    """One simulated machine, until interrupted."""
+    from backend.shell.sim.process import run
+
+    site = load_site(site_name)
+    site.machine(machine)
+    run(site, machine, connect or (LIVE,), start_at, until)
+
+
+@contextlib.contextmanager
+def _machines(
+    site_name: str, site: Site, endpoint: str, start_at: float
+) -> Iterator[dict[str, subprocess.Popen[bytes]]]:
+    """One process per machine of the site, ended with the demo."""
+    # One machine needs no parallel linear algebra; threads would only fight the backend.
+    environment = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    processes = {}
+    try:
+        for machine in site.machines:
+            processes[machine.name] = subprocess.Popen(
+                [
+                    *(sys.executable, "-m", "cockpit.cli", "sim", "--site", site_name),
+                    *("--machine", machine.name, "--connect", endpoint),
+                    *("--start-at", f"{start_at:.6f}"),
+                ],
+                env=environment,
+            )
+        yield processes
+    finally:
+        for process in processes.values():
+            process.terminate()
+        for process in processes.values():
+            try:
+                process.wait(timeout=3.0)
+            except subprocess.TimeoutExpired:
+                process.kill()
+
+
+def _announce(site: Site, port: int, host: str, open_browser: bool) -> None:
+    shown = "127.0.0.1" if host in ("", "0.0.0.0", "::") else host
+    url = f"http://{shown}:{port}"
+    print(f"{site.title}: {url}", flush=True)
+    if not open_browser:
+        return
+    has_screen = sys.platform in ("darwin", "win32") or any(
+        os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY")
+    )
+    opened = False
+    if has_screen:
+        with contextlib.suppress(webbrowser.Error):
+            opened = webbrowser.open(url)
+    if not opened:
+        print(f"No browser could be opened here: open {url} yourself.", flush=True)

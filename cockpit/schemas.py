@@ -1,0 +1,43 @@
+"""`cockpit schema NAME`: the JSON Schema of every document the program reads or prints."""
+
+from __future__ import annotations
+
+import json
+
+from pydantic import BaseModel
+
+from backend.documents.assessment import AssessmentDocument
+from backend.documents.bench import BenchDocument
+from backend.documents.state import StateDocument
+from backend.errors import InputError
+from backend.shell.app.models import HealthModel, SiteModel, SnapshotModel
+from backend.site.tables import SiteTable
+
+SCHEMAS: dict[str, tuple[type[BaseModel], str]] = {
+    "state": (StateDocument, "machine states, read by assess"),
+    "assess": (AssessmentDocument, "what assess prints"),
+    "bench": (BenchDocument, "what bench --json prints"),
+    "snapshot": (SnapshotModel, "/api/snapshot and the Zenoh key cockpit/snapshot"),
+    "site": (SiteModel, "/api/site"),
+    "health": (HealthModel, "/api/health"),
+    "site-file": (SiteTable, "a site file, as TOML"),
+}
+
+
+def print_schema(name: str) -> None:
+    """Prints one schema, or the names when `name` is empty."""
+    if not name:
+        for known, (_, what) in SCHEMAS.items():
+            print(f"{known:10} {what}")
+        return
+    if name not in SCHEMAS:
+        raise InputError(f'schema: there is no "{name}"; allowed are {", ".join(SCHEMAS)}.')
+    model, what = SCHEMAS[name]
+    schema = model.model_json_schema()
+    document = {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": name,
+        **schema,
+        "description": schema.get("description", what),
+    }
+    print(json.dumps(document, indent=2))

@@ -1,0 +1,206 @@
+"""One running cockpit: link, pipeline, scene and page wired together."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.progress import Progress
+
+from backend.cspace.resolution import resolution
+from backend.documents.site import site_document
+from backend.documents.snapshot import snapshot_document
+from backend.machine.load import load_machine
+from backend.machine.model import Machine
+from backend.pipeline.config import Config
+from backend.pipeline.images import SunParameters
+from backend.pipeline.records import Snapshot
+from backend.safety.partner import Limits
+from backend.shell.app.app import Sources, create_app
+from backend.shell.app.server import WebServer, bind
+from backend.shell.app.viewer_proxy import Hooks, viewer_router
+from backend.shell.app.wire import dumps
+from backend.shell.hub import Hub
+from backend.shell.link.receiver import Receiver
+from backend.shell.link.relay import Relay
+from backend.shell.link.session import open_session
+from backend.shell.link.source import LinkSource
+from backend.shell.runner import Runner
+from backend.site.site import Site
+from cockpit.views.inputs import scene_site
+from cockpit.views.server import View, start
+
+
+@dataclass(frozen=True)
+class Options:
+    """host, port: of the page; listen, connect: Zenoh endpoints; own: machines answered for."""
+
+    host: str
+    port: int
+    listen: tuple[str, ...]
+    connect: tuple[str, ...]
+    own: tuple[str, ...]
+    mode: str
+
+
+def load_models(site: Site) -> dict[str, Machine]:
+    """Every machine's description; a bar is shown while bodies are fitted to meshes."""
+    models: dict[str, Machine] = {}
+    loaded: dict[tuple[str, str | None], Machine] = {}
+    with Progress(console=Console(stderr=True), transient=True) as bar:
+        for machine in site.machines:
+            key = (machine.model, machine.sidecar)
+            if key not in loaded:
+                task = bar.add_task(f"{machine.name}: {machine.model}", total=1.0)
+
+                def progress(done: float, what: str = "", task: Any = task) -> None:
+                    bar.update(task, completed=done, description=what or None)
+
+                sidecar = None if machine.sidecar is None else site.folder / machine.sidecar
+                loaded[key] = load_machine(machine.model, sidecar, site.folder, progress)
+                bar.update(task, completed=1.0)
+            models[machine.name] = loaded[key]
+    return models
+
+
+def make_config(site: Site, models: dict[str, Machine], own: tuple[str, ...], mode: str) -> Config:
+    """The pipeline's configuration; `own` empty means every machine."""
+    for name in own:
+        site.machine(name)
+    return Config(
+        frame=site.frame,
+        machines=models,
+        labels={machine.name: machine.label for machine in site.machines},
+        own=own or tuple(models),
+        limits=Limits(site.safety.slow_below, site.safety.stop_below),
+        eta=site.safety.eta,
+        mode=mode,
+    )
+
+
+class Station:
+    """Everything of one backend process. `demo_began`: wall time at which the demo's script began."""
+
+    def __init__(
+        self,
+        site: Site,
+        options: Options,
+        demo_began: Callable[[], float] | None = None,
+    ) -> None:
+        listener = bind(options.host, options.port)
+        self._closing = contextlib.ExitStack()
+        self._closing.callback(listener.close)
+        try:
+            self._build(site, options, demo_began, listener)
+        except BaseException:
+            self.close()
+            raise
+
+    def _build(
+        self,
+        site: Site,
+        options: Options,
+        demo_began: Callable[[], float] | None,
+        listener: Any,
+    ) -> None:
+        models = load_models(site)
+        self.config = make_config(site, models, options.own, options.mode)
+        self._demo_began = demo_began
+        self.hub = Hub()
+        session = open_session(options.listen, options.connect, mode="router")
+        self._closing.callback(session.close)
+        prefixes = {machine.prefix: machine.name for machine in site.machines}
+        self.receiver = Receiver(session, prefixes)
+        self._closing.callback(self.receiver.close)
+        self.runner = Runner(
+            self.config,
+            SunParameters(site.sun.m, site.sun.n, site.sun.eta),
+            LinkSource(self.receiver),
+            self.hub,
+            site.rates.step_hz,
+            site.rates.image_hz,
+        )
+        relay = Relay(
+            session, self.hub, lambda s: dumps(self.document(s)), lambda s: dumps(self.alarms(s))
+        )
+        self.view: View = start(scene_site(site, models), self.hub, own=self.config.own[0])
+        self._closing.callback(self.view.stop)
+        sources = Sources(
+            hub=self.hub,
+            site=site_document(site, self.config),
+            snapshot=self.document,
+            backend=self.backend,
+            on_message=self._on_message,
+        )
+        hooks = Hooks(opened=self.view.attach, closed=self.view.detach)
+        app = create_app(sources, viewer_router(lambda: self.view.port, hooks))
+        self.web = WebServer(app, listener)
+        self.runner.start()
+        self._closing.callback(self.runner.stop)
+        relay.start()
+        self._closing.callback(relay.stop)
+        self.web.start()
+        self._closing.callback(self.web.stop)
+
+    def close(self) -> None:
+        """Close everything, in the reverse order of opening."""
+        self._closing.close()
+
+    def document(self, snapshot: Snapshot) -> dict[str, Any]:
+        """A snapshot as plain JSON, with what only a running backend knows."""
+        document = snapshot_document(snapshot, self.config)
+        rate = self.runner.image_timing.timing().rate
+        if rate > 0.0:
+            document["resolution"] = _resolutions(snapshot, self.config, 1.0 / rate)
+        if self._demo_began is not None:
+            document["demo"] = {"elapsed": time.time() - self._demo_began()}
+        return document
+
+    def alarms(self, snapshot: Snapshot) -> list[dict[str, Any]]:
+        alarms: list[dict[str, Any]] = snapshot_document(snapshot, self.config)["alarms"]
+        return alarms
+
+    def backend(self) -> dict[str, Any]:
+        """Live timings of both loops."""
+        return {
+            "step": vars(self.runner.step_timing.timing()),
+            "images": vars(self.runner.image_timing.timing()),
+            "failure": self.runner.failure,
+        }
+
+    def _on_message(self, message: dict[str, Any]) -> None:
+        """What a page asks of the scene; anything else is ignored."""
+        page, name = message.get("page"), message.get("name")
+        if not isinstance(name, str) or not (page is None or isinstance(page, str)):
+            return
+        with contextlib.suppress(ValueError):
+            if message.get("type") == "camera":
+                self.view.set_camera(name, page)
+            elif message.get("type") == "own":
+                self.view.set_own(name, page)
+
+
+def _resolutions(
+    snapshot: Snapshot, config: Config, cycle_time: float
+) -> dict[str, dict[str, Any]]:
+    """Sun 2020, Section 5.1, per machine, at the rate that images really have."""
+    found = {}
+    for name, state in snapshot.machines.items():
+        speed = float(np.linalg.norm(state.pose.base_velocity))
+        if not math.isfinite(speed):
+            continue
+        now = resolution(cycle_time, speed, state.pose.joint_velocities)
+        roles = [joint.role for joint in config.machines[name].joints]
+        found[name] = {
+            "points_per_m": now.points_per_metre,
+            "points_per_rad": dict(zip(roles, now.points_per_radian.tolist(), strict=True)),
+        }
+    return found
+
+

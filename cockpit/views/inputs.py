@@ -1,0 +1,77 @@
+"""What the scene is made of, and where its snapshots come from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Protocol
+
+from backend.machine.model import Machine
+from backend.pipeline.records import Snapshot
+from backend.site.site import Site
+from backend.spatial.boxes import Boxes
+from backend.spatial.types import Array
+
+
+@dataclass(frozen=True)
+class SceneMachine:
+    """label: as operators call it ("LEFT"); model: its description."""
+
+    label: str
+    model: Machine
+
+
+@dataclass(frozen=True)
+class SceneSite:
+    """A site as it is drawn.
+
+    origin: easting, northing, height of the site frame's origin in the projected CRS [m];
+    machines: in the order of the site; obstacles: in the site frame;
+    slow_below, stop_below: limits of the distance [m].
+    """
+
+    title: str
+    origin: tuple[float, float, float]
+    machines: Mapping[str, SceneMachine]
+    obstacles: Boxes
+    slow_below: float
+    stop_below: float
+
+    def __post_init__(self) -> None:
+        if not self.machines:
+            raise ValueError("a scene needs at least one machine")
+        if not 0.0 <= self.stop_below <= self.slow_below:
+            raise ValueError("limits must satisfy 0 <= stop_below <= slow_below")
+
+
+def scene_site(site: Site, models: Mapping[str, Machine]) -> SceneSite:
+    """What the scene needs of a loaded site; models: one per machine's name."""
+    easting, northing, height = (float(value) for value in site.frame.origin)
+    return SceneSite(
+        title=site.title,
+        origin=(easting, northing, height),
+        machines={m.name: SceneMachine(m.label, models[m.name]) for m in site.machines},
+        obstacles=site.obstacle_boxes(),
+        slow_below=site.safety.slow_below,
+        stop_below=site.safety.stop_below,
+    )
+
+
+class ZoneImage(Protocol):
+    """The part of an image of an ordered pair that the ground shows.
+
+    zone: (k, 2) site frame [m], where the own base point must not go; state_time [s].
+    """
+
+    @property
+    def zone(self) -> Array: ...
+
+
+class SnapshotSource(Protocol):
+    """The newest snapshot and images; a hub."""
+
+    def latest(self) -> Snapshot | None: ...
+
+    def wait(self, after_cycle: int, timeout: float) -> Snapshot | None: ...
+
+    def image(self, kind: str, key: str) -> ZoneImage | None: ...

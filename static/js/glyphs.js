@@ -1,0 +1,113 @@
+// Shapes that carry meaning without colour: star, base cross, level shapes for SVG and canvas.
+
+import { C } from "./theme.js";
+
+function starPath(g, x, y, r) {
+  g.beginPath();
+  for (let i = 0; i < 10; i++) {
+    const a = -Math.PI / 2 + (i * Math.PI) / 5;
+    const k = i % 2 ? 0.42 * r : r;
+    g.lineTo(x + k * Math.cos(a), y + k * Math.sin(a));
+  }
+  g.closePath();
+}
+
+/** White with a black outline, 20 px; hollow when what it marks is stale. */
+export function star(g, x, y, hollow, r = 11) {
+  g.lineJoin = "round";
+  starPath(g, x, y, r);
+  g.lineWidth = hollow ? 5 : 4;
+  g.strokeStyle = "#000000";
+  g.stroke();
+  if (hollow) {
+    g.lineWidth = 1.6;
+    g.strokeStyle = "#FFFFFF";
+    g.stroke();
+  } else {
+    g.fillStyle = "#FFFFFF";
+    g.fill();
+  }
+}
+
+/** The base point, as a cross. */
+export function cross(g, x, y, colour, r = 7) {
+  for (const [width, style] of [[6, C.halo], [3, colour]]) {
+    g.lineWidth = width;
+    g.strokeStyle = style;
+    g.beginPath();
+    g.moveTo(x - r, y); g.lineTo(x + r, y);
+    g.moveTo(x, y - r); g.lineTo(x, y + r);
+    g.stroke();
+  }
+}
+
+const SVG = "http://www.w3.org/2000/svg";
+const svg = (tag, attributes) => {
+  const node = document.createElementNS(SVG, tag);
+  for (const [name, value] of Object.entries(attributes)) node.setAttribute(name, value);
+  return node;
+};
+const question = (fill) => {
+  const text = svg("text", { x: 24, y: 35, "text-anchor": "middle", "font-size": 32, "font-weight": 700, "font-family": "Arial, sans-serif", fill });
+  text.textContent = "?";
+  return text;
+};
+const octagonPoints = (r) => Array.from({ length: 8 }, (_, i) => {
+  const a = Math.PI / 8 + (i * Math.PI) / 4;
+  return `${(24 + r * Math.cos(a)).toFixed(1)},${(24 + r * Math.sin(a)).toFixed(1)}`;
+}).join(" ");
+
+/** The alarm line's shape: triangle, octagon, dashed question mark; nothing when calm. */
+export function levelShape(level) {
+  if (level === "SLOW") {
+    return [svg("path", { d: "M24 4 46 43H2Z", fill: "#14100A" }), svg("path", { d: "M22 17h4v13h-4zM22 34h4v4h-4z", fill: C.slow })];
+  }
+  if (level === "STOP") {
+    return [svg("polygon", { points: octagonPoints(23), fill: "#FFFFFF" }), svg("polygon", { points: octagonPoints(19.5), fill: C.stop }), svg("path", { d: "M12 21h24v6H12z", fill: "#FFFFFF" })];
+  }
+  if (level === "UNKNOWN") {
+    return [svg("circle", { cx: 24, cy: 24, r: 21, fill: "none", stroke: C.unknown, "stroke-width": 4, "stroke-dasharray": "8 5" }), question("#FFC9C3")];
+  }
+  return [];
+}
+
+/** Lamp of a machine: disc = valid, dotted hollow ring = stale, ? = unknown. */
+export function lampShape(validity, level) {
+  if (validity === "VALID") {
+    if (level === "STOP") return [svg("polygon", { points: octagonPoints(23), fill: C.stop, stroke: "#FFFFFF", "stroke-width": 3 })];
+    if (level === "SLOW") return [svg("path", { d: "M24 4 46 43H2Z", fill: C.slow })];
+    return [svg("circle", { cx: 24, cy: 24, r: 15, fill: "#C8D0D6" })];
+  }
+  if (validity === "STALE") return [svg("circle", { cx: 24, cy: 24, r: 18, fill: "none", stroke: C.stale, "stroke-width": 6, "stroke-dasharray": "5 6" })];
+  return [svg("circle", { cx: 24, cy: 24, r: 21, fill: "none", stroke: C.unknown, "stroke-width": 4, "stroke-dasharray": "8 5" }), question(C.unknown)];
+}
+
+/** The same shapes, small, on a canvas. */
+export function levelMark(g, level, x, y, r) {
+  g.beginPath();
+  if (level === "SLOW") {
+    g.moveTo(x, y - r); g.lineTo(x + r, y + 0.8 * r); g.lineTo(x - r, y + 0.8 * r); g.closePath();
+    g.fillStyle = C.slow;
+    g.fill();
+  } else if (level === "STOP") {
+    for (let i = 0; i < 8; i++) g.lineTo(x + r * Math.cos(Math.PI / 8 + (i * Math.PI) / 4), y + r * Math.sin(Math.PI / 8 + (i * Math.PI) / 4));
+    g.closePath();
+    g.fillStyle = C.stop;
+    g.fill();
+    g.lineWidth = 1.5;
+    g.strokeStyle = "#FFFFFF";
+    g.stroke();
+  } else {
+    g.arc(x, y, r, 0, 2 * Math.PI);
+    g.setLineDash([3, 2]);
+    g.lineWidth = 1.5;
+    g.strokeStyle = C.unknown;
+    g.stroke();
+    g.setLineDash([]);
+    g.fillStyle = C.unknown;
+    g.font = `700 ${Math.round(1.7 * r)}px Arial, sans-serif`;
+    g.textAlign = "center";
+    g.textBaseline = "middle";
+    g.fillText("?", x, y + 0.5);
+  }
+}

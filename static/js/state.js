@@ -1,0 +1,188 @@
+// What the page knows. Frames go in through `accept`; everything that draws only reads.
+
+import { wrap } from "./axis.js";
+
+const HISTORY = 60; // seconds of trends
+const SWITCH = 0.3; // a new partner must be this much nearer [m], so that the panels do not flip
+
+export const state = {
+  site: null,
+  snapshot: null,
+  arrival: -Infinity, // of the newest snapshot, performance.now() [ms]
+  images: new Map(), // "left<-right" -> {header, arrays, arrival, serial}
+  own: null,
+  partner: null,
+  socket: "connecting",
+  serial: 0, // counts snapshots
+  history: [], // {time, distance, level, ages}
+  events: [], // {level, label, start, end}
+  closest: Infinity, // smallest distance seen [m]
+  contacts: 0,
+  delays: [], // from the server's clock to arrival here [s]
+};
+
+let minimumDelay = Infinity;
+let lastHistory = -Infinity;
+let touching = false;
+
+export function accept(header, arrays) {
+  const now = performance.now();
+  if (header.type === "site") {
+    state.site = header;
+    if (!(state.own in header.machines)) state.own = header.own?.find((name) => name in header.machines) ?? names()[0];
+    state.partner = null;
+    if (state.snapshot && names().some((name) => !(name in state.snapshot.machines))) forget();
+  } else if (header.type === "snapshot") {
+    if (state.snapshot && header.cycle < state.snapshot.cycle && header.time < state.snapshot.time) forget(); // restarted
+    state.snapshot = header;
+    state.arrival = now;
+    state.serial += 1;
+    if (!header.machines[state.own]) state.own = names()[0];
+    state.partner = nearest();
+    const delay = Date.now() / 1000 - header.wall;
+    if (Number.isFinite(delay)) {
+      minimumDelay = Math.min(minimumDelay, delay);
+      state.delays.push(delay);
+      if (state.delays.length > 250) state.delays.shift();
+    }
+    remember();
+  } else if (header.type === "sun") {
+    const serial = (state.images.get(header.key)?.serial ?? 0) + 1;
+    state.images.set(header.key, { header, arrays, arrival: now, serial });
+  }
+}
+
+function forget() {
+  state.images.clear();
+  state.history.length = 0;
+  state.events.length = 0;
+  lastHistory = -Infinity;
+}
+
+export const names = () => Object.keys(state.site?.machines ?? state.snapshot?.machines ?? {});
+export const machine = (name) => state.snapshot?.machines[name] ?? null;
+export const described = (name) => state.site?.machines[name] ?? null;
+export const label = (name) => machine(name)?.label ?? described(name)?.label ?? String(name ?? "–").toUpperCase();
+
+export function choose(name) {
+  if (!names().includes(name) || name === state.own) return false;
+  state.own = name;
+  state.partner = null;
+  state.partner = nearest();
+  return true;
+}
+
+/** The entry of `pairs` for two machines, in the order (one, other). */
+export function pair(one, other) {
+  const found = state.snapshot?.pairs.find((p) => (p.a === one && p.b === other) || (p.a === other && p.b === one));
+  if (!found || found.a === one) return found ?? null;
+  return { ...found, a: found.b, b: found.a, body_a: found.body_b, body_b: found.body_a, points: found.points && [...found.points].reverse() };
+}
+
+function nearest() {
+  const own = machine(state.own);
+  if (!own) return null;
+  let best = null;
+  for (const name of names()) {
+    if (name === state.own || !machine(name)) continue;
+    const p = machine(name).position;
+    let distance = pair(state.own, name)?.distance ?? null;
+    if (distance === null) distance = own.position && p ? Math.hypot(own.position[0] - p[0], own.position[1] - p[1]) : Infinity;
+    const compared = name === state.partner ? distance - SWITCH : distance;
+    if (!best || compared < best.compared) best = { name, compared };
+  }
+  return best?.name ?? null;
+}
+
+export const image = () => state.images.get(`${state.own}<-${state.partner}`) ?? null;
+
+/** Seconds since the last snapshot arrived. */
+export const silence = () => (performance.now() - state.arrival) / 1000;
+
+/** Age of what the snapshot says: pipeline, the way here beyond the quickest seen, and waiting since. */
+export function snapshotAge() {
+  const s = state.snapshot;
+  if (!s) return Infinity;
+  const delay = state.delays.length ? Math.max(0, state.delays[state.delays.length - 1] - minimumDelay) : 0;
+  return Math.max(0, s.time - (s.state_time ?? s.time)) + delay + silence();
+}
+
+/** Age of an image's state, by the server's clock as the newest snapshot carries it. */
+export function imageAge(entry) {
+  if (!entry || !state.snapshot) return Infinity;
+  return Math.max(0, state.snapshot.time - entry.header.state_time) + silence();
+}
+
+export function link() {
+  if (state.socket !== "open" && !state.snapshot) return "connecting";
+  const s = silence();
+  return s > 1 ? "lost" : s > 0.5 ? "slow" : "ok";
+}
+
+/** The oldest stream of a machine [s]; Infinity when one was never received. */
+export function dataAge(name) {
+  const ages = machine(name)?.ages;
+  if (!ages) return Infinity;
+  const known = Object.values(ages).map((a) => (a === null ? Infinity : a));
+  return Math.max(...known) + silence();
+}
+
+/** Angles of Sun 2020, Fig. 2, from a joint's own value: sign * q + offset. */
+export function sunMap(name, role) {
+  const given = described(name)?.sun_map;
+  const index = ["boom", "stick", "bucket"].indexOf(role);
+  if (given && index >= 0) return { sign: given.signs[index], offset: given.offsets[index] };
+  const m = machine(name);
+  const offset = (m?.sun?.[role] ?? 0) - (m?.joints?.[role] ?? 0);
+  return { sign: 1, offset: Number.isFinite(offset) ? offset : 0 };
+}
+
+/** Swing, left positive, within ±π [rad]. */
+export function swing(name) {
+  const sign = described(name)?.sun_map?.azimuth_sign ?? 1;
+  return wrap(sign * (machine(name)?.joints?.swing ?? NaN));
+}
+
+/** Swing, left positive, at which the arm has the azimuth theta. */
+export const swingAt = (name, theta) => wrap(theta - (machine(name)?.azimuth ?? 0) + swing(name));
+
+export const severity = { CLEAR: 0, SLOW: 1, STOP: 2, UNKNOWN: 3 };
+
+/** Alarms that count, the severest first, the own machine's before others' at the same level. */
+export function alarms() {
+  const active = (state.snapshot?.alarms ?? []).filter((a) => a.active !== false && severity[a.level] > 0);
+  const mine = (a) => (a.machine === state.own ? 0 : 1);
+  return active.map((a, i) => [a, i]).sort(([a, i], [b, j]) => severity[b.level] - severity[a.level] || mine(a) - mine(b) || i - j).map(([a]) => a);
+}
+
+export const partnerLevel = (distance) => {
+  const safety = state.site?.safety ?? { slow_below: 0.8, stop_below: 0.2 };
+  if (distance === null || distance === undefined) return "UNKNOWN";
+  return distance < safety.stop_below ? "STOP" : distance < safety.slow_below ? "SLOW" : "CLEAR";
+};
+
+function remember() {
+  const s = state.snapshot;
+  const p = pair(state.own, state.partner);
+  const distance = p?.distance ?? null;
+  for (const { distance: d } of s.pairs) if (d !== null && d < state.closest) state.closest = d;
+  const contact = s.pairs.some((q) => q.distance !== null && q.distance <= 0);
+  if (contact && !touching) state.contacts += 1;
+  touching = contact;
+
+  if (s.time - lastHistory >= 0.2 || s.time < lastHistory) {
+    lastHistory = s.time;
+    const ages = Object.fromEntries(names().map((name) => [name, machine(name)?.ages?.joints ?? null]));
+    state.history.push({ time: s.time, distance, pair: `${state.own} ${state.partner}`, ages });
+    while (state.history.length && state.history[0].time < s.time - HISTORY) state.history.shift();
+  }
+
+  const open = new Map(state.events.filter((e) => e.end === null).map((e) => [e.key, e]));
+  for (const alarm of alarms()) {
+    const key = `${alarm.name} ${alarm.machine} ${alarm.level}`;
+    if (open.delete(key)) continue;
+    state.events.push({ key, level: alarm.level, label: alarm.line, machine: alarm.machine, start: s.time, end: null });
+  }
+  for (const event of open.values()) event.end = s.time;
+  state.events = state.events.filter((e) => e.end === null || e.end > s.time - HISTORY);
+}

@@ -1,0 +1,44 @@
+// A canvas that fits its box at the screen's resolution, carries what it shows, and answers the pointer.
+
+import { mark } from "./words.js";
+
+/**
+ * paint(g, width, height, dpr) draws and returns {state, age, label}: what the drawing shows (for
+ * data-state), its age in seconds and a sentence for those who do not see it.
+ * probe(x, y) returns lines of text for the pointer, or null.
+ */
+export function surface(canvas, paint, probe) {
+  const g = canvas.getContext("2d", { alpha: false });
+  const s = { canvas, probe, width: 0, height: 0, dirty: true, last: -Infinity, lastLabel: -Infinity };
+
+  new ResizeObserver(() => {
+    const dpr = window.devicePixelRatio || 1;
+    const { width, height } = canvas.getBoundingClientRect();
+    s.width = Math.round(width);
+    s.height = Math.round(height);
+    canvas.width = Math.max(1, Math.round(s.width * dpr));
+    canvas.height = Math.max(1, Math.round(s.height * dpr));
+    s.dpr = dpr;
+    s.dirty = true;
+    s.last = -Infinity;
+  }).observe(canvas);
+
+  /** Draws when something changed, at most once per `period` ms. */
+  s.draw = (now, period) => {
+    if (!s.dirty || now - s.last < period || s.width < 20 || s.height < 10) return false;
+    s.dirty = false;
+    s.last = now;
+    g.setTransform(s.dpr, 0, 0, s.dpr, 0, 0);
+    const shown = paint(g, s.width, s.height, s.dpr);
+    if (shown) {
+      mark(canvas, "state", JSON.stringify(shown.state));
+      mark(canvas, "age", Number.isFinite(shown.age) ? shown.age.toFixed(2) : "none");
+      if (now - s.lastLabel > 500) {
+        s.lastLabel = now;
+        canvas.setAttribute("aria-label", shown.label);
+      }
+    }
+    return true;
+  };
+  return s;
+}
