@@ -6,12 +6,12 @@ import json
 from pathlib import Path
 from typing import Any
 
+from backend.documents.assess import assess
 from backend.documents.state import StateDocument, parse_state
 from backend.errors import InputError
 from backend.fusion.crs import SiteFrame
 from backend.machine.load import load_machine
 from backend.machine.model import Machine
-from backend.documents.assess import assess
 from backend.pipeline.images import SunParameters
 from backend.shell.app.wire import dumps
 from backend.site.site import Site, load_site

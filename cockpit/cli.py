@@ -112,8 +112,9 @@ def assess(
 
 @app.command()
 def schema(
-    name: Annotated[str, typer.Argument(help="Document's name; without it the names are listed.")]
-    = "",
+    name: Annotated[
+        str, typer.Argument(help="Document's name; without it the names are listed.")
+    ] = "",
 ) -> None:
     """Print the JSON Schema of a document that the program reads or prints."""
     from cockpit.schemas import print_schema

@@ -85,7 +85,7 @@ def make_config(site: Site, models: dict[str, Machine], own: tuple[str, ...], mo
 
 
 class Station:
-    """Everything of one backend process. `demo_began`: wall time at which the demo's script began."""
+    """Everything of one backend process. demo_began: wall time of the demo script's start [s]."""
 
     def __init__(
         self,
@@ -202,5 +202,3 @@ def _resolutions(
             "points_per_rad": dict(zip(roles, now.points_per_radian.tolist(), strict=True)),
         }
     return found
-
-

@@ -22,7 +22,7 @@ def shared_data() -> Path:
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Tests of real descriptions are collected where the descriptions are, and counted elsewhere."""
+    """Tests of real descriptions run where the descriptions are, and are deselected elsewhere."""
     if SHARED.is_dir():
         return
     absent = [i for i in items if "shared_data" in getattr(i, "fixturenames", ())]

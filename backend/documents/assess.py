@@ -192,9 +192,7 @@ def _sun(
 ) -> dict[str, Any]:
     """Sun's sets with partner as the obstacle A and own as B."""
     b, a = sun_pose(machines[own], poses[own]), sun_pose(machines[partner], poses[partner])
-    image = sun_image(
-        a, b, machines[own].max_reach, parameters.eta, parameters.m, parameters.n
-    )
+    image = sun_image(a, b, machines[own].max_reach, parameters.eta, parameters.m, parameters.n)
     now = image.current
     return {
         "eta": image.eta,

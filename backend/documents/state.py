@@ -116,6 +116,8 @@ def _by_joint(machine: Machine, values: dict[str, float], where: str) -> Array:
     for name, value in values.items():
         if name not in index:
             roles = ", ".join(j.role for j in machine.joints)
-            raise InputError(f"{where}.{name} is not a joint of {machine.name}; allowed are {roles}.")
+            raise InputError(
+                f"{where}.{name} is not a joint of {machine.name}; allowed are {roles}."
+            )
         q[index[name]] = value
     return q

@@ -73,14 +73,14 @@ def slope(
     if n < 2 or spread <= 0.0:
         return (0.0,) * width
     last = rows[-1]
-    return tuple(
-        sum(
-            (t - mean) * turn(row[k], last[k], circular[k])
-            for t, row in zip(stamps, rows, strict=True)
-        )
-        / spread
-        for k in range(width)
-    )
+    weights = [(t - mean) / spread for t in stamps]
+    rates = []
+    for k in range(width):
+        end, wraps, rate = last[k], circular[k], 0.0
+        for weight, row in zip(weights, rows, strict=True):
+            rate += weight * turn(row[k], end, wraps)
+        rates.append(rate)
+    return tuple(rates)
 
 
 def slope_sigma(stamps: list[float], sigma: float) -> float:

@@ -66,7 +66,8 @@ def update(clock: Clock, sample: ClockSample) -> Clock:
     )
     if not possible:
         return Clock(clock.trips, clock.stepped, clock.received, clock.rejected + 1)
-    trip = Bounds(received, sent - remote, received - remote)
+    own = DRIFT * (received - sent)  # the offset may have drifted while the trip was under way
+    trip = Bounds(received, sent - remote - own, received - remote + own)
     known = clock.offset(received)
     count = clock.received + 1
     if known is not None and (trip.upper < known[0] or trip.lower > known[1]):

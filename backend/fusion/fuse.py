@@ -5,13 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 
-from backend.fusion.motion import joints_at, root_at, yaw_at
+from backend.fusion.motion import joints_at, root_at, tilt, yaw_at
 from backend.fusion.pose import FusedPose
 from backend.fusion.rig import Rig
 from backend.fusion.samples import Fix
 from backend.fusion.streams import Streams
 from backend.fusion.validity import judge, statuses
-from backend.spatial.rotation import from_attitude
 
 
 def common_time(
@@ -51,13 +50,13 @@ def fuse(rig: Rig, streams: Streams, now: float, common: float) -> FusedPose:
     offset = streams.offset(now)
     stamp = common - (offset[0] + offset[1]) / 2.0 if offset else common
     arm = joints_at(rig, streams, stamp)
-    M = from_attitude(0.0, arm.pitch, arm.roll)
+    M = tilt(arm.pitch, arm.roll)
     course = yaw_at(rig, streams, stamp, M, arm)
     base = root_at(rig, streams, stamp, M, arm, course)
     newest = streams.position.last
     lost = newest is None or streams.no_fix > newest.stamp
     fix = Fix.NONE if newest is None or lost else newest.fix
-    status = statuses(rig, streams, now, arm.from_imus)
+    status = statuses(streams, now, offset, arm.from_imus)
     validity, reasons = judge(rig, streams, now, status, fix, base.sigma, arm.unknown)
     return FusedPose(
         machine=rig.name,
@@ -76,5 +75,5 @@ def fuse(rig: Rig, streams: Streams, now: float, common: float) -> FusedPose:
         sigma_joints=arm.sigma,
         fix=fix,
         streams=status,
-        clock_offset=streams.clock.offset(now),
+        clock_offset=offset[:2] if offset and offset[2] == "offset" else None,
     )

@@ -19,15 +19,20 @@ from backend.fusion.align import (
     turn,
 )
 from backend.fusion.plausible import Entry
-from backend.fusion.rig import Rig, follow
+from backend.fusion.rig import Rig
 from backend.fusion.streams import Buffer, Streams
-from backend.spatial.rotation import about_axis
 from backend.spatial.types import Array
 
 JOINT_WINDOW = 0.1  # of finite-difference joint rates [s]
 BASE_WINDOW = 0.5  # of the base's velocity and yaw rate [s]
 SIGNIFICANT = 3.0  # base rates below this many sigmas are taken for standing still
 LONGEST_GAP = 2.0  # sigma grows no further: the pose is long stale by then [s]
+
+
+def tilt(pitch: float, roll: float) -> Array:
+    """(3, 3) Ry(-pitch) Rx(roll), written out: this runs for every machine in every cycle."""
+    cp, sp, cr, sr = math.cos(pitch), math.sin(pitch), math.cos(roll), math.sin(roll)
+    return np.array([[cp, -sp * sr, -sp * cr], [0.0, cr, -sr], [sp, cp * sr, cp * cr]])
 
 
 @dataclass(frozen=True)
@@ -48,16 +53,18 @@ class Arm:
     stamp: float
     samples: tuple[Entry, ...]
 
-    def q_at(self, stamps: list[float], wraps: bool) -> Array:
-        """(k, n) joint values at several stamps: the swing as it was, the others as they are."""
-        rows = np.tile(self.q, (len(stamps), 1))
-        for row, stamp in zip(rows, stamps, strict=True):
-            if len(self.samples) > 1 and stamp <= self.samples[-1].stamp:
-                a, b, fraction, _ = bracket(self.samples, stamp)
-                row[0] = a.value[0] + fraction * turn(b.value[0], a.value[0], wraps)
+    def swing_at(self, stamps: list[float], wraps: bool) -> Array:
+        """(k,) the swing at several stamps [rad]."""
+        samples, last = self.samples, self.samples[-1].stamp if self.samples else -math.inf
+        swing, rate = float(self.q[0]), float(self.rates[0])
+        found = []
+        for stamp in stamps:
+            if stamp <= last:
+                a, b, fraction, _ = bracket(samples, stamp)
+                found.append(a.value[0] + fraction * turn(b.value[0], a.value[0], wraps))
             else:
-                row[0] = self.q[0] + self.rates[0] * (stamp - self.stamp)
-        return rows
+                found.append(swing + rate * (stamp - self.stamp))
+        return np.array(found)
 
 
 @dataclass(frozen=True)
@@ -100,8 +107,8 @@ def joints_at(rig: Rig, streams: Streams, stamp: float) -> Arm:
         sigma = max([sigma, *(math.sqrt(2.0) * reading.sigma for reading in readings.values())])
     pitch, roll = imu.pitch_roll(base.up) if base else (0.0, 0.0)
     return Arm(
-        q=np.nan_to_num(np.array(q), nan=0.0),
-        rates=np.nan_to_num(np.array(rates), nan=0.0),
+        q=_known(q),
+        rates=_known(rates),
         sigma=sigma,
         unknown=tuple(k for k, value in enumerate(q) if math.isnan(value)),
         pitch=pitch,
@@ -111,6 +118,10 @@ def joints_at(rig: Rig, streams: Streams, stamp: float) -> Arm:
         stamp=stamp,
         samples=streams.joints.entries,
     )
+
+
+def _known(values: list[float]) -> Array:
+    return np.array([0.0 if math.isnan(value) else value for value in values])
 
 
 def _joint_samples(
@@ -148,18 +159,13 @@ def yaw_at(rig: Rig, streams: Streams, stamp: float, M: Array, arm: Arm) -> Cour
         return Course(0.0, 0.0, rig.config.sigma_heading)
     rows = _around(entries, at)
     stamps = [row.stamp for row in rows]
-    turns_with_upper = rig.machine.heading_of == "upper"
-    axis = np.tile(np.array(rig.forward), (len(rows), 1))
-    if turns_with_upper:
-        R_root_upper = _turned(rig, arm.q_at(stamps, rig.continuous[0])[:, 0])
-        axis = R_root_upper @ np.array(rig.forward)
-    axis = axis @ M.T
+    axis = rig.forward.at(arm.swing_at(stamps, rig.continuous[0])) @ M.T
     azimuth = np.arctan2(axis[:, 1], axis[:, 0]).tolist()
     yaws: list[tuple[float, ...]] = [
         (row.value[0] - az,) for row, az in zip(rows, azimuth, strict=True)
     ]
     sigma = max(rows[-1].sigma, rows[-2].sigma) if len(rows) > 1 else rows[0].sigma
-    if turns_with_upper:
+    if rig.machine.heading_of == "upper":
         sigma = math.hypot(sigma, arm.sigma)
     value, (rate,), grown = _carried(rig, stamps, yaws, at, (True,), sigma, _yaw_acceleration(rig))
     yaw = value[0]
@@ -179,7 +185,7 @@ def root_at(rig: Rig, streams: Streams, stamp: float, M: Array, arm: Arm, course
         return Place(np.zeros(3), np.zeros(3), rig.config.sigma_limit)
     rows = _around(entries, at)
     stamps = [row.stamp for row in rows]
-    lever = follow(rig.antenna, arm.q_at(stamps, rig.continuous[0]))[1] @ M.T
+    lever = rig.antenna.at(arm.swing_at(stamps, rig.continuous[0])) @ M.T
     yaw = course.yaw + course.rate * (np.array(stamps) - at)
     c, s = np.cos(yaw), np.sin(yaw)
     roots = np.array([row.value for row in rows])
@@ -236,12 +242,6 @@ def _series(buffer: Buffer, stamp: float) -> tuple[tuple[Entry, ...], float]:
     if buffer.entries or buffer.last is None:
         return buffer.entries, stamp
     return (buffer.last,), buffer.last.stamp
-
-
-def _turned(rig: Rig, swing: Array) -> Array:
-    """(k, 3, 3) turn of the upper body in the root frame at swing (k,) [rad]."""
-    hop = rig.arm[0]
-    return about_axis(hop.R @ hop.axis, swing)
 
 
 def _yaw_acceleration(rig: Rig) -> float:

@@ -7,10 +7,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from backend.errors import InputError
 from backend.fusion.crs import SiteFrame
 from backend.fusion.samples import Fix
 from backend.machine.model import Machine
-from backend.spatial.rotation import about_axis
 from backend.spatial.types import Array
 
 
@@ -60,6 +60,20 @@ class Hop:
 
 
 @dataclass(frozen=True)
+class Swept:
+    """A vector in the root frame that may turn with the swing: level + cos(q) even + sin(q) odd."""
+
+    level: Array
+    even: Array
+    odd: Array
+
+    def at(self, swing: Array) -> Array:
+        """(k, 3) at swing angles (k,) [rad]."""
+        c, s = np.cos(swing)[:, None], np.sin(swing)[:, None]
+        return np.asarray(self.level + c * self.even + s * self.odd)
+
+
+@dataclass(frozen=True)
 class Imu:
     """An IMU's link: the joint that moves its part (-1: tracks), R_part_link (3, 3) fixed."""
 
@@ -81,9 +95,9 @@ class Rig:
     high: tuple[float, ...]
     max_velocity: tuple[float, ...]
     imus: Mapping[str, Imu]
-    antenna: tuple[Hop, ...]
     arm: tuple[Hop, ...]  # root to the last actuated part
-    forward: tuple[float, float, float]  # the heading sensor's axis in the root frame at swing 0
+    antenna: Swept  # position in the root frame [m]
+    forward: Swept  # the heading sensor's axis in the root frame
 
 
 JOINT_TOLERANCE = 0.5  # sensors read a little beyond the stated limits [rad]
@@ -104,7 +118,6 @@ def make_rig(
         )
         for joint in machine.joints
     ]
-    angle = machine.heading_offset
     return Rig(
         name=name,
         machine=machine,
@@ -116,9 +129,9 @@ def make_rig(
         high=tuple(high for _, high in finite),
         max_velocity=tuple(joint.max_velocity for joint in machine.joints),
         imus=_imus(machine),
-        antenna=hops(machine, machine.antenna.link, machine.antenna.position),
         arm=hops(machine, _moved_by(machine, len(machine.joints) - 1), np.zeros(3)),
-        forward=(float(np.cos(angle)), float(np.sin(angle)), 0.0),
+        antenna=_antenna(machine),
+        forward=_forward(machine),
     )
 
 
@@ -140,16 +153,37 @@ def hops(machine: Machine, link: int, point: Array) -> tuple[Hop, ...]:
     return tuple(found)
 
 
-def follow(way: tuple[Hop, ...], q: Array) -> tuple[Array, Array]:
-    """Where a way ends: R (k, 3, 3) and p (k, 3) in the root frame, of joints q (k, n) [rad, m]."""
-    R = np.broadcast_to(np.eye(3), (len(q), 3, 3))
-    p = np.zeros((len(q), 3))
-    for hop in way:
-        p = p + R @ hop.p
-        R = R @ hop.R
-        if hop.joint >= 0:
-            R = R @ about_axis(hop.axis, q[:, hop.joint])
-    return R, p
+def _antenna(machine: Machine) -> Swept:
+    """Raises InputError for an antenna on the arm: its lever would depend on every joint."""
+    way = hops(machine, machine.antenna.link, machine.antenna.position)
+    moving = [hop for hop in way if hop.joint >= 0]
+    if not moving:
+        return Swept(way[0].p, np.zeros(3), np.zeros(3))
+    if len(moving) > 1 or moving[0].joint != 0:
+        link = machine.links[machine.antenna.link].name
+        raise InputError(
+            f'machine "{machine.name}": the GNSS antenna sits on "{link}"; allowed is a link of '
+            "the tracks or of the upper body."
+        )
+    turned = _swept(way[0], way[1].p)
+    return Swept(turned.level + way[0].p, turned.even, turned.odd)
+
+
+def _forward(machine: Machine) -> Swept:
+    """The body's heading is that of the root's x axis, carried round by the swing; the sensor's
+    axis is `heading_offset` to the left of it."""
+    angle = machine.heading_offset
+    axis = np.array([np.cos(angle), np.sin(angle), 0.0])
+    if machine.heading_of == "tracks":
+        return Swept(axis, np.zeros(3), np.zeros(3))
+    hop = hops(machine, _moved_by(machine, 0), np.zeros(3))[0]
+    return _swept(hop, hop.R.T @ axis)
+
+
+def _swept(hop: Hop, vector: Array) -> Swept:
+    """R Rot(axis, q) vector by Rodrigues' formula, split by its dependence on q."""
+    along = hop.axis * float(hop.axis @ vector)
+    return Swept(hop.R @ along, hop.R @ (vector - along), hop.R @ np.cross(hop.axis, vector))
 
 
 def _imus(machine: Machine) -> dict[str, Imu]:

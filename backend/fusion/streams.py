@@ -12,8 +12,10 @@ offset) the local time of measurement. Without a round-trip estimate the smalles
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from operator import attrgetter
 
 from backend.fusion import clock, plausible
 from backend.fusion.clock import Clock
@@ -40,6 +42,9 @@ SILENCE = 0.5  # nothing accepted for this long: a step is believed [s]
 SLIDE = 1.0  # the smallest delay is over the last one to two of these [s]
 
 
+_arrival = attrgetter("arrival")
+
+
 @dataclass(frozen=True)
 class Buffer:
     """One stream. entries: oldest first; last: the newest ever accepted, kept for drawing."""
@@ -55,12 +60,9 @@ class Buffer:
         window = min(SPAN, max(now - self.since, 0.1))
         if len(self.entries) == CAPACITY:
             window = min(window, max(now - self.entries[0].arrival, 1e-3))
-        count = 0
-        for entry in reversed(self.entries):
-            if entry.arrival < now - window:
-                break
-            count += 1
-        return count / window
+        # Arrivals are in order but for clock steps, which empty the buffer.
+        first = bisect_left(self.entries, now - window, key=_arrival)
+        return (len(self.entries) - first) / window
 
 
 EMPTY = Buffer()

@@ -14,14 +14,16 @@ WORDS = {"joints": "joint angles", "position": "position", "heading": "heading"}
 
 
 def statuses(
-    rig: Rig, streams: Streams, now: float, joints_from_imus: bool
+    streams: Streams,
+    now: float,
+    offset: tuple[float, float, str] | None,
+    joints_from_imus: bool,
 ) -> dict[str, StreamStatus]:
     """Health of "joints", "position", "heading" and "attitude" (all IMUs: the oldest's age).
 
-    Ages are worst cases of the clock's bounds. Joints that come from IMUs are as old as the oldest
-    IMU, and as the joint samples that give the rest.
+    offset: of the machine's clock, `streams.offset(now)`; ages are worst cases of its bounds.
+    Joints that come from IMUs are as old as the oldest IMU and the samples that give the rest.
     """
-    offset = streams.offset(now)
     lower, source = (offset[0], offset[2]) if offset else (math.nan, "arrival")
 
     def age(buffer: Buffer) -> float:

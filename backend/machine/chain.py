@@ -34,4 +34,5 @@ def joints_between(links: tuple[Link, ...], some: list[int]) -> list[int]:
                 path.add(links[i].joint)
             i = links[i].parent
         paths.append(path)
-    return sorted(set.union(*paths) - set.intersection(*paths))
+    everywhere = {k for k in paths[0] if all(k in path for path in paths)}
+    return sorted({k for path in paths for k in path} - everywhere)

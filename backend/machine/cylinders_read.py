@@ -37,6 +37,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 
 from backend.errors import InputError
 from backend.machine.cylinders import Cylinder, Linkage, Strut, tube
+from backend.machine.fitting_clip import clip
 from backend.spatial.types import Array
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
@@ -142,9 +143,12 @@ def read_cylinder(table: Mapping[str, object], load_mesh: LoadMesh, file: str) -
 def _strut(table: StrutTable, load_mesh: LoadMesh) -> Strut:
     if table.mesh is not None:
         assert table.toward is not None
-        return Strut(
-            load_mesh(table.mesh), np.array(table.pin), np.array(table.toward), _unit(table.hinge)
-        )
+        pin, toward = np.array(table.pin), np.array(table.toward)
+        triangles = load_mesh(table.mesh)
+        if table.length is not None and np.linalg.norm(toward - pin) > 0.0:
+            along = (toward - pin) / np.linalg.norm(toward - pin)
+            triangles = clip(triangles, along, float(along @ pin) + table.length)
+        return Strut(triangles, pin, toward, _unit(table.hinge))
     assert table.radius is not None
     assert table.length is not None
     bar = tube(table.radius, table.length, table.spread)

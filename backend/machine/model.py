@@ -106,7 +106,7 @@ class ArmPlane:
 
 @dataclass(frozen=True)
 class Antenna:
-    """Where a GNSS antenna sits. link: index into Machine.links; position: (3,) [m] in its frame."""
+    """A GNSS antenna. link: index into Machine.links; position: (3,) in that link's frame [m]."""
 
     link: int
     position: Array

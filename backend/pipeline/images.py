@@ -44,7 +44,7 @@ class PairImage:
 
 
 def pair_key(own: str, partner: str) -> str:
-    """"own<-partner": own must avoid partner."""
+    """ "own<-partner": own must avoid partner."""
     return f"{own}<-{partner}"
 
 

@@ -12,7 +12,7 @@ from cockpit.views.inputs import SceneSite
 
 FOV = np.deg2rad(45.0)  # vertical
 PLAN_FOV = np.deg2rad(24.0)
-ELEVATION = np.deg2rad(28.0)  # of the site camera
+ELEVATION = np.deg2rad(32.0)  # of the site camera
 ASPECT = 1.65  # width to height that the cameras are laid out for
 REACH_UNPLACED = 8.0  # [m] drawn around the origin before any machine is placed
 
@@ -49,14 +49,15 @@ def camera_pose(name: str, site: SceneSite, snapshot: Snapshot | None, own: str)
     radius = max(along, across / ASPECT)
     if name == "plan":
         # A hair south of straight down, so that north is up.
-        height = 1.1 * radius / np.tan(PLAN_FOV / 2.0)
+        height = 1.2 * radius / np.tan(PLAN_FOV / 2.0)
         above = center + np.array([0.0, -0.002 * height, height])
         return CameraPose(above, center, float(PLAN_FOV))
     if name == "site":
-        distance = 0.95 * radius / np.tan(FOV / 2.0)
+        distance = 0.88 * radius / np.tan(FOV / 2.0)
         away = _across(placed)
         offset = np.append(away * np.cos(ELEVATION), np.sin(ELEVATION)) * distance
-        return CameraPose(center + offset, center + np.array([0.0, 0.0, 0.6]), float(FOV))
+        nearer = center + np.append(0.14 * radius * away, 0.0)
+        return CameraPose(nearer + offset, nearer, float(FOV))
     raise ValueError(f'no camera "{name}"; there are {", ".join(camera_names(site))}')
 
 
@@ -102,5 +103,5 @@ def _behind(site: SceneSite, name: str, placed: dict[str, Body3D]) -> CameraPose
     on_ground = np.array([base[0], base[1], ground])
     # Over the right shoulder, so that the own upper body does not hide the bucket.
     position = on_ground - 1.15 * reach * ahead + 0.45 * reach * side
-    position[2] += 0.95 * reach
+    position[2] += 1.05 * reach
     return CameraPose(position, on_ground + 0.45 * reach * ahead + [0, 0, 0.1 * reach], float(FOV))

@@ -11,8 +11,8 @@ from cockpit.views.lettering import width, written
 from cockpit.views.shapes import Float32, box_mesh, feature_edges, polyline
 
 MAJOR = 10.0  # [m] between labelled lines; 5 on a small site
-MINOR = 1.0
-LETTER = 0.04  # height, as a share of half the ground's side
+MINOR = 0.2  # as a share of the labelled distance
+LETTER = 0.034  # height, as a share of half the ground's side
 
 
 def light(scene: viser.SceneApi) -> None:
@@ -50,7 +50,7 @@ class Ground:
             width=2.0 * half,
             height=2.0 * half,
             position=(corner[0], corner[1], -0.01),
-            cell_size=MINOR,
+            cell_size=MINOR * major,
             section_size=major,
             cell_color=palette.GRID_MINOR,
             section_color=palette.GRID_MAJOR,
@@ -123,13 +123,16 @@ def grid_labels(
     strokes = []
     letter = LETTER * half
     steps = np.arange(-np.floor(half / major), np.floor(half / major) + 1) * major
-    for step in steps:
-        easting = f"{round(origin[0] + corner[0] + step)}E"
-        left = corner[0] + step + 0.4 * letter
-        strokes.append(written(easting, (left, west_south[1] - 1.6 * letter), letter))
-        northing = f"{round(origin[1] + corner[1] + step)}N"
-        left = west_south[0] - 0.6 * letter - width(northing, letter)
-        strokes.append(written(northing, (left, corner[1] + step + 0.4 * letter), letter))
+    for x, y in zip(corner[0] + steps, corner[1] + steps, strict=True):
+        if x >= west_south[0] - 0.5 * major:
+            easting = f"{round(origin[0] + x)}E"
+            strokes.append(
+                written(easting, (x + 0.4 * letter, west_south[1] - 1.6 * letter), letter)
+            )
+        if y >= west_south[1]:
+            northing = f"{round(origin[1] + y)}N"
+            left = west_south[0] - 0.6 * letter - width(northing, letter)
+            strokes.append(written(northing, (left, y + 0.4 * letter), letter))
     return np.concatenate(strokes)
 
 

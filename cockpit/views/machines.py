@@ -32,6 +32,8 @@ class MachineNodes:
         self._root = scene.add_frame(root, show_axes=False, visible=False)
         self._frames: dict[int, viser.FrameHandle] = {}
         self._paint: list[tuple[viser.MeshHandle, palette.Rgb]] = []
+        visuals = [visual for link in entry.model.links for visual in link.visuals]
+        self._one_color = len({visual.color for visual in visuals}) <= 1
         for index in range(len(entry.model.links)):
             self._add_link(scene, f"{root}/{index}", index, tint)
         self._poses = np.full((len(entry.model.links), 4, 4), np.nan)
@@ -58,11 +60,13 @@ class MachineNodes:
 
     def _add_link(self, scene: viser.SceneApi, root: str, index: int, tint: palette.Rgb) -> None:
         meshes = link_meshes(self._entry.model, index)
+        if self._one_color:
+            meshes = [(vertices, faces, None) for vertices, faces, _ in meshes]
         if not meshes:
             return
         self._frames[index] = scene.add_frame(root, show_axes=False)
         for k, (vertices, faces, own_color) in enumerate(meshes):
-            color = tint if own_color is None else palette.tint(own_color, tint)
+            color = palette.tint(own_color or self._plain(index), tint)
             handle = scene.add_mesh_simple(
                 f"{root}/{k}",
                 vertices,
@@ -77,6 +81,11 @@ class MachineNodes:
             edges = feature_edges(vertices, faces)
             if len(edges):
                 _lines(scene, f"{root}/{k}/edges", edges, palette.EDGE, 1.2)
+
+    def _plain(self, link: int) -> palette.Rgb:
+        """The colour of a link whose description gives none, or the same one to the whole machine."""
+        dark = self._entry.model.links[link].part in ("tracks", "bucket")
+        return palette.IRON if dark else palette.PAINT
 
     def update(self, state: MachineState, ground: float, now: float, lost: float) -> None:
         """lost: seconds for which no snapshot came, 0 while they do; ground: its height [m]."""

@@ -26,6 +26,8 @@ PARTNER = rgb("#A970F0")
 SITE = rgb("#3E8E78")
 STALE = rgb("#8A949E")
 EDGE = rgb("#0B0F13")
+PAINT = rgb("#D8D8D8")  # of machines described without colours; tinted when drawn
+IRON = rgb("#3C4044")
 
 LEVEL: dict[Level, Rgb] = {
     Level.CLEAR: SECONDARY,

@@ -145,9 +145,7 @@ class ResolutionModel(BaseModel):
     """How densely one machine's motion is sampled at the present cycle time and speeds."""
 
     points_per_m: Unknown = Field(description="along the path of travel; null at standstill [1/m]")
-    points_per_rad: dict[str, Unknown] = Field(
-        description="per joint; null at standstill [1/rad]"
-    )
+    points_per_rad: dict[str, Unknown] = Field(description="per joint; null at standstill [1/rad]")
 
 
 class TimingModel(BaseModel):

@@ -50,9 +50,7 @@ def send(
     return (*on_air, OnAir(arrival_time(stamp, radio), message))
 
 
-def receive(
-    on_air: tuple[OnAir[M], ...], now: float
-) -> tuple[tuple[M, ...], tuple[OnAir[M], ...]]:
+def receive(on_air: tuple[OnAir[M], ...], now: float) -> tuple[tuple[M, ...], tuple[OnAir[M], ...]]:
     """(messages that have arrived by `now`, messages still on air)."""
     if not on_air or on_air[0].arrival > now:
         return (), on_air

@@ -1,0 +1,101 @@
+// The alarm line and the list behind "+2". Its height never changes; stale data never read CLEAR.
+
+import { $, make, mark, partName, slowText, steady, write } from "./words.js";
+import { metres, seconds } from "./axis.js";
+import { alarms, label, link, machine, pair, severity, silence, snapshotAge, state } from "./state.js";
+import { levelShape } from "./glyphs.js";
+import { acknowledge, acknowledged, sound } from "./sound.js";
+import { ageLevel, ageText } from "./head.js";
+
+let line, detail, age;
+let shape = null;
+let listOpen = false;
+let listKey = "";
+const calmDistance = steady(0.06);
+
+/** The line's level, words and key; the key changes when the digits must not wait. */
+function compose() {
+  const s = state.snapshot;
+  const state_ = link();
+  if (!s) return { level: "NONE", line: state_ === "connecting" ? "Connecting to the backend" : "Waiting for data", detail: "", key: "none" };
+  if (state_ === "lost") {
+    return { level: "UNKNOWN", line: `LINK LOST · last data ${seconds(silence())} ago`, detail: "Nothing on this page is current. Clearance unknown. Reconnecting.", key: "lost" };
+  }
+  const [first, ...more] = alarms();
+  if (first) {
+    return { level: first.level, line: first.line.startsWith(first.level) ? first.line : `${first.level} · ${first.line}`, detail: first.detail ?? "", key: `${first.level} ${first.name} ${first.machine} ${first.line.replace(/[\d.]+/g, "")}`, alarm: first, more: more.length };
+  }
+  const p = pair(state.own, state.partner);
+  const invalid = [state.own, state.partner].find((name) => name && machine(name)?.validity !== "VALID");
+  if (invalid || (p && p.distance === null)) {
+    const why = p?.reason || machine(invalid)?.reasons?.[0] || "no complete pose";
+    return { level: "UNKNOWN", line: `UNKNOWN · ${label(state.own)} ↔ ${label(state.partner)}`, detail: `Clearance unknown: ${why}.`, key: "unknown" };
+  }
+  if (!p) return { level: "CLEAR", line: `CLEAR · ${label(state.own)} · no other machine`, detail: "", key: "alone" };
+  const distance = calmDistance(p.distance);
+  return { level: "CLEAR", line: `CLEAR · ${label(p.a)} ${partName(p.body_a)} ↔ ${label(p.b)} ${partName(p.body_b)} · ${metres(distance)}`, detail: "", key: `clear ${p.body_a} ${p.body_b}` };
+}
+
+export function startAlarm() {
+  line = slowText($("alarm-line"));
+  detail = slowText($("alarm-detail"));
+  age = slowText($("alarm-age"));
+  $("alarm-ack").addEventListener("click", silenceAlarms);
+  $("alarm-more").addEventListener("click", () => showList(!listOpen));
+}
+
+export function silenceAlarms() {
+  acknowledge(alarms());
+  update();
+}
+
+export function showList(open) {
+  listOpen = open && alarms().length > 0;
+  $("alarm-list").hidden = !listOpen;
+  $("alarm-more").setAttribute("aria-expanded", String(listOpen));
+  listKey = "";
+  list();
+}
+
+export function update() {
+  const now = compose();
+  const box = $("alarm");
+  if (box.dataset.level !== now.level) line(now.line, `${now.key} now`);
+  mark(box, "level", now.level);
+  line(now.line, now.key);
+  detail(now.detail, now.key);
+  const howOld = snapshotAge();
+  age(Number.isFinite(howOld) ? ageText(howOld) : "", ageLevel(howOld));
+  if (shape !== now.level) {
+    shape = now.level;
+    $("alarm-glyph").replaceChildren(...levelShape(now.level));
+  }
+  const present = alarms();
+  const unseen = present.some((alarm) => !acknowledged(alarm));
+  mark(box, "unseen", unseen && now.level !== "CLEAR" ? 1 : 0);
+  $("alarm-ack").hidden = !unseen || link() === "lost";
+  const more = $("alarm-more");
+  more.hidden = !(now.more > 0);
+  write(more, `+${now.more ?? 0}`);
+  more.title = "All alarms";
+  const p = pair(state.own, state.partner);
+  sound(present, (p?.approach ?? 0) > 0);
+  if (listOpen && !present.length) showList(false);
+  else list();
+}
+
+function list() {
+  if (!listOpen) return;
+  const s = state.snapshot;
+  const present = alarms();
+  const key = present.map((a) => a.line).join("|");
+  if (key === listKey) return;
+  listKey = key;
+  const items = present.map((a) => {
+    const since = new Date((s.wall - (s.time - a.since)) * 1000).toLocaleTimeString([], { hour12: false });
+    return make("li", {}, make("b", { "data-level": a.level, text: a.level }), make("span", { text: a.line.replace(/^[A-Z]+ · /, "") }), make("span", { class: "dim", text: `since ${since}` }), make("small", { text: a.detail ?? "" }));
+  });
+  $("alarm-list").replaceChildren(make("ul", {}, ...items));
+}
+
+export const worst = (name) => alarms().filter((a) => a.machine === name).reduce((level, a) => (severity[a.level] > severity[level] ? a.level : level), "CLEAR");

@@ -1,0 +1,158 @@
+// Wires the page: frames into the state, the state onto the panels, each at its own pace.
+
+import { connect } from "./socket.js";
+import { readSizes } from "./theme.js";
+import { $ } from "./words.js";
+import { metres } from "./axis.js";
+import { accept, choose, image, imageAge, label, link, machine, names, silence, snapshotAge, state } from "./state.js";
+import { head } from "./head.js";
+import * as hover from "./hover.js";
+import * as alarm from "./alarm.js";
+import * as topbar from "./topbar.js";
+import * as demo from "./demo.js";
+import { startSound, toggleSound } from "./sound.js";
+import { startScene, updateCameras } from "./scene.js";
+import { plan } from "./plots/plan.js";
+import { reach } from "./plots/reach.js";
+import { slices } from "./plots/slices.js";
+import { bars } from "./plots/bars.js";
+import { limits } from "./plots/limits.js";
+import { trends } from "./plots/trends.js";
+import { timeline } from "./plots/timeline.js";
+
+readSizes();
+
+const plots = { plan: plan(), reach: reach(), bars: bars(), limits: limits(), trends: trends(), timeline: timeline() };
+const three = slices();
+const images = [plots.reach, ...three];
+const live = [plots.plan, plots.bars, plots.limits, plots.trends, plots.timeline];
+// The least time between two drawings [ms].
+const PERIOD = new Map([[plots.plan, 38], [plots.bars, 95], [plots.limits, 95], [plots.trends, 240], [plots.timeline, 240], ...images.map((s) => [s, 90])]);
+for (const s of [...live, ...images]) hover.watch(s);
+
+const heads = Object.fromEntries(["scene", "plan", "reach", "bars", "limits", "trends", "timeline", "slice-0", "slice-1", "slice-2"].map((name) => [name, head($(`${name}-panel`))]));
+
+let waitingToDraw = null; // wall clock of the newest snapshot not drawn yet
+const latency = { arrival: [], drawn: [] }; // from the snapshot's wall clock [ms]
+const push = (list, value) => {
+  list.push(value);
+  if (list.length > 500) list.shift();
+};
+const quantiles = (list) => {
+  const sorted = [...list].sort((a, b) => a - b);
+  const at = (q) => (sorted.length ? Math.round(sorted[Math.min(sorted.length - 1, Math.floor(q * sorted.length))] * 10) / 10 : null);
+  return { last: list[list.length - 1] ?? null, p50: at(0.5), p95: at(0.95), p99: at(0.99), count: list.length };
+};
+
+function own(name) {
+  if (!choose(name)) return;
+  sessionStorage.setItem("own", name);
+  socket.send({ type: "own", machine: name });
+  for (const s of [...live, ...images]) Object.assign(s, { dirty: true, last: -Infinity });
+}
+
+function onKey(event) {
+  if (event.ctrlKey || event.altKey || event.metaKey || /^(INPUT|SELECT|TEXTAREA)$/.test(event.target?.tagName ?? "")) return;
+  if (event.key >= "1" && event.key <= "9") own(names()[Number(event.key) - 1]);
+  else if (event.key === "?") help();
+  else if (event.key === "a" || event.key === "A") alarm.silenceAlarms();
+  else if (event.key === "m" || event.key === "M") toggleSound();
+  else if (event.key === "Escape") {
+    hover.hide();
+    alarm.showList(false);
+  } else return;
+  event.preventDefault();
+}
+
+function help() {
+  const dialog = $("help");
+  if (dialog.open) dialog.close();
+  else dialog.showModal();
+}
+
+state.own = sessionStorage.getItem("own") ?? undefined;
+topbar.startTopbar(own);
+alarm.startAlarm();
+startSound();
+demo.startDemo();
+startScene(onKey);
+document.addEventListener("keydown", onKey);
+$("help-open").addEventListener("click", help);
+addEventListener("resize", () => {
+  readSizes();
+  for (const s of [...live, ...images]) s.dirty = true;
+});
+
+const scheme = location.protocol === "https:" ? "wss:" : "ws:";
+const socket = connect(`${scheme}//${location.host}/ws`, onFrame, (word) => {
+  state.socket = word;
+  if (word === "open" && state.own) socket?.send({ type: "own", machine: state.own });
+});
+
+
+
+function onFrame(header, arrays) {
+  const partner = state.partner;
+  accept(header, arrays);
+  if (header.type === "site") {
+    updateCameras(socket.send);
+    for (const s of [...live, ...images]) s.dirty = true;
+  } else if (header.type === "snapshot") {
+    push(latency.arrival, Date.now() - 1000 * header.wall);
+    waitingToDraw = header.wall;
+    for (const s of live) s.dirty = true;
+    if (partner !== state.partner) for (const s of images) s.dirty = true;
+  } else if (header.type === "sun" && header.key === `${state.own}<-${state.partner}`) {
+    for (const s of images) s.dirty = true;
+  }
+}
+
+/** Words, ages and levels: ten times a second whether or not anything arrives. */
+function tick() {
+  topbar.update();
+  alarm.update();
+  demo.update();
+  updateCameras(socket.send);
+  const subject = `${label(state.own)}`;
+  const age = snapshotAge();
+  const old = imageAge(image());
+  const m = machine(state.own);
+  heads.scene.who(state.site ? `${names().length} machines` : "");
+  heads.plan.who(`${subject}`);
+  heads.reach.who(`${subject}${Number.isFinite(m?.end_point?.[2]) ? ` · tip ${metres(m.end_point[2])}` : ""}`);
+  for (const name of ["bars", "limits"]) heads[name].who(subject);
+  heads.trends.who(state.partner ? `${subject} ↔ ${label(state.partner)}` : subject);
+  for (const name of ["scene", "bars", "limits", "trends", "timeline"]) heads[name].age(age);
+  heads.plan.age(image() ? Math.max(age, old) : age);
+  for (const name of ["reach", "slice-0", "slice-1", "slice-2"]) heads[name].age(old);
+  // Ages and hollow stars must go on while nothing arrives.
+  if (old > 0.5) for (const s of images) s.dirty = true;
+  if (link() !== "ok" && state.snapshot) for (const s of live) s.dirty = true;
+  hover.refresh();
+}
+
+function frame(now) {
+  let drawn = false;
+  for (const [s, period] of PERIOD) {
+    // A picture that only grows old needs no more than two drawings a second.
+    const slow = s !== plots.plan && silence() > 1 ? 500 : period;
+    if (s.draw(now, slow) && s === plots.plan) drawn = true;
+  }
+  if (drawn && waitingToDraw !== null) {
+    push(latency.drawn, Date.now() - 1000 * waitingToDraw);
+    waitingToDraw = null;
+    if (image() && document.body.dataset.ready !== "1") document.body.dataset.ready = "1";
+  }
+  requestAnimationFrame(frame);
+}
+
+setInterval(tick, 100);
+tick();
+requestAnimationFrame(frame);
+
+// For tests and for the curious: what the page knows, to read.
+window.cockpit = Object.freeze({
+  get state() { return state; },
+  get latency() { return { arrival: quantiles(latency.arrival), drawn: quantiles(latency.drawn) }; },
+  get link() { return link(); },
+});

@@ -1,0 +1,35 @@
+// The embedded 3D scene and its camera buttons. The page's keys work inside the frame, too.
+
+import { $, make, write } from "./words.js";
+import { label, names, state } from "./state.js";
+
+let built = "";
+
+export function startScene(onKey) {
+  const frame = $("scene");
+  frame.addEventListener("load", () => {
+    try {
+      frame.contentWindow.addEventListener("keydown", onKey);
+    } catch {
+      // another origin: the keys then work outside the scene only
+    }
+  });
+  frame.src = "/view/?hideViserLogo&darkMode";
+}
+
+export function updateCameras(send) {
+  const key = `${names().join(" ")} ${state.own}`;
+  if (key === built || !state.site) return;
+  built = key;
+  const cameras = [["site", "Site"], ["plan", "Plan"], [`behind ${label(state.own)}`, "Behind"], ["follow", "Follow"]];
+  $("cameras").replaceChildren(...cameras.map(([name, text]) => {
+    const button = make("button", { type: "button", title: `Camera: ${name}`, text });
+    button.addEventListener("click", () => send({ type: "camera", name }));
+    return button;
+  }));
+}
+
+export function note(text) {
+  $("scene-note").hidden = !text;
+  write($("scene-note"), text);
+}

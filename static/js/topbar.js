@@ -1,0 +1,92 @@
+// Mode, site, one button per machine, backend, link.
+
+import { $, make, mark, slowText, write } from "./words.js";
+import { number, seconds } from "./axis.js";
+import { dataAge, label, link, machine, names, silence, state } from "./state.js";
+import { lampShape } from "./glyphs.js";
+import { worst } from "./alarm.js";
+
+const FIX = { RTK_FIXED: "RTK fixed", RTK_FLOAT: "RTK float", FIXED: "RTK fixed", FLOAT: "RTK float", DGNSS: "DGNSS", SINGLE: "single fix", NONE: "no fix" };
+
+let built = "";
+const machines = new Map();
+let cycle, rate, linkAge, own;
+
+export function startTopbar(chooseOwn) {
+  own = chooseOwn;
+  cycle = slowText($("cycle"));
+  rate = slowText($("rate"));
+  linkAge = slowText($("link-age"));
+}
+
+function build() {
+  const key = names().map((name) => `${name}:${label(name)}`).join(" ");
+  if (key === built) return;
+  built = key;
+  machines.clear();
+  const many = names().length > 2;
+  mark($("machines"), "many", many ? 1 : 0);
+  $("machines").replaceChildren(...names().map((name, index) => {
+    const lamp = document.createElementNS("http://www.w3.org/2000/svg", "svg");
+    lamp.setAttribute("viewBox", "0 0 48 48");
+    lamp.setAttribute("class", "lamp");
+    lamp.setAttribute("aria-hidden", "true");
+    const word = make("span", { class: "word" });
+    const extra = make("span", { class: "extra dim" });
+    const numbers = make("span", { class: "numbers dim" });
+    const button = make("button", { type: "button", class: "machine", title: `Own machine: ${label(name)} (key ${index + 1})` },
+      lamp, make("span", { class: "name", text: label(name) }), make("span", { class: "key", text: String(index + 1) }),
+      make("span", { class: "pair" }, make("span", {}, word, extra), numbers));
+    button.addEventListener("click", () => own(name));
+    machines.set(name, { button, lamp, word, extra, numbers: slowText(numbers), shape: "" });
+    return button;
+  }));
+}
+
+function fixWord(fix) {
+  if (fix === null || fix === undefined) return "no fix";
+  return FIX[String(fix).toUpperCase()] ?? String(fix).replace(/_/g, " ").toLowerCase();
+}
+
+export function update() {
+  const s = state.snapshot;
+  const how = link();
+  mark(document.body, "link", how);
+  mark($("link"), "link", how);
+  write($("link-word"), { ok: "LINK OK", slow: "▲ LINK SLOW", lost: "LINK LOST", connecting: "connecting" }[how]);
+  const delay = state.delays.length ? Math.max(0, state.delays[state.delays.length - 1]) : NaN;
+  if (how === "ok") linkAge(Number.isFinite(delay) && delay < 10 ? `${number(delay * 1000, 0)} ms` : "clock differs", how);
+  else linkAge(s ? `${seconds(silence())} ago` : "", how);
+  if (state.site) {
+    write($("site-title"), state.site.title ?? state.site.name);
+    const epsg = state.site.frame?.epsg ? `EPSG:${state.site.frame.epsg}` : "";
+    write($("site-name"), [state.site.name, epsg].filter(Boolean).join(" · "));
+  }
+  if (!s) return;
+  const mode = s.mode ?? state.site?.mode;
+  write($("mode"), mode);
+  mark($("mode"), "mode", mode);
+  const ms = s.backend?.cycle_ms;
+  cycle(ms ? `cycle ${number(ms.p95, 1)} ms` : "cycle –");
+  rate(s.backend?.rate_hz ? `p95 · ${number(s.backend.rate_hz, 0)} Hz` : "");
+  build();
+  for (const [name, parts] of machines) {
+    const m = machine(name);
+    if (!m) continue;
+    const validity = how === "lost" ? "STALE" : m.validity;
+    mark(parts.button, "validity", validity);
+    parts.button.setAttribute("aria-pressed", String(name === state.own));
+    const level = worst(name);
+    if (parts.shape !== validity + level) {
+      parts.shape = validity + level;
+      parts.lamp.replaceChildren(...lampShape(validity, level));
+    }
+    write(parts.word, validity);
+    write(parts.extra, ` ${fixWord(m.fix)}`);
+    const age = dataAge(name);
+    const hz = m.rates?.joints;
+    const text = Number.isFinite(age) ? `${number(age, 2)} s` : "no data";
+    parts.numbers(`${text} · ${Number.isFinite(hz) ? `${number(hz, 0)} Hz` : "– Hz"}`, validity);
+    parts.button.setAttribute("aria-label", `${label(name)}, ${validity}, ${fixWord(m.fix)}`);
+  }
+}
