@@ -23,6 +23,7 @@ from backend.pipeline.images import SunParameters
 from backend.pipeline.records import Snapshot
 from backend.safety.partner import Limits
 from backend.shell.app.app import Sources, create_app
+from backend.shell.app.feed import Frames
 from backend.shell.app.server import WebServer, bind
 from backend.shell.app.viewer_proxy import Hooks, viewer_router
 from backend.shell.app.wire import dumps
@@ -34,7 +35,7 @@ from backend.shell.link.source import LinkSource
 from backend.shell.runner import Runner
 from backend.site.site import Site
 from cockpit.views.inputs import scene_site
-from cockpit.views.server import View, start
+from cockpit.views.server import HEAD, View, start
 
 
 @dataclass(frozen=True)
@@ -126,20 +127,24 @@ class Station:
             site.rates.step_hz,
             site.rates.image_hz,
         )
+        frames = Frames(self.hub, self.document)
         relay = Relay(
-            session, self.hub, lambda s: dumps(self.document(s)), lambda s: dumps(self.alarms(s))
+            session,
+            self.hub,
+            lambda s: dumps(self.document(s)),
+            lambda s: dumps(self.document(s)["alarms"]),
+            frames.images,
         )
         self.view: View = start(scene_site(site, models), self.hub, own=self.config.own[0])
         self._closing.callback(self.view.stop)
         sources = Sources(
-            hub=self.hub,
             site=site_document(site, self.config),
-            snapshot=self.document,
+            frames=frames,
             backend=self.backend,
             on_message=self._on_message,
         )
         hooks = Hooks(opened=self.view.attach, closed=self.view.detach)
-        app = create_app(sources, viewer_router(lambda: self.view.port, hooks))
+        app = create_app(sources, viewer_router(lambda: self.view.port, hooks, HEAD))
         self.web = WebServer(app, listener)
         self.runner.start()
         self._closing.callback(self.runner.stop)
@@ -158,13 +163,10 @@ class Station:
         rate = self.runner.image_timing.timing().rate
         if rate > 0.0:
             document["resolution"] = _resolutions(snapshot, self.config, 1.0 / rate)
+        document["backend"] = self.backend()
         if self._demo_began is not None:
             document["demo"] = {"elapsed": time.time() - self._demo_began()}
         return document
-
-    def alarms(self, snapshot: Snapshot) -> list[dict[str, Any]]:
-        alarms: list[dict[str, Any]] = snapshot_document(snapshot, self.config)["alarms"]
-        return alarms
 
     def backend(self) -> dict[str, Any]:
         """Live timings of both loops."""
@@ -176,7 +178,7 @@ class Station:
 
     def _on_message(self, message: dict[str, Any]) -> None:
         """What a page asks of the scene; anything else is ignored."""
-        page, name = message.get("page"), message.get("name")
+        page, name = message.get("page"), message.get("name", message.get("machine"))
         if not isinstance(name, str) or not (page is None or isinstance(page, str)):
             return
         with contextlib.suppress(ValueError):

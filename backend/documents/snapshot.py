@@ -148,7 +148,7 @@ def _alarm(alarm: Alarm, config: Config) -> dict[str, Any]:
         "name": concern.name,
         "machine": concern.machine,
         "line": words.line(concern, config.labels),
-        "detail": words.detail(concern, config.machines[concern.machine]),
+        "detail": words.detail(concern, config.machines[concern.machine], config.labels),
         "since": alarm.since,
         "active": alarm.active,
     }

@@ -44,7 +44,7 @@ class MachineStateDocument(Table):
     roll: Number = Field(0.0, ge=-1.5, le=1.5, description="about the forward axis [rad]")
     joints: dict[str, Number] = Field(description="the URDF's own joint values by role [rad]")
     joint_velocities: dict[str, Number] = Field(default_factory=dict, description="[rad/s]")
-    sigma: Sigma = Sigma()
+    sigma: Sigma = Field(default_factory=Sigma)
 
 
 class ObstacleDocument(Table):

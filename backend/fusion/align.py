@@ -9,13 +9,12 @@ from operator import itemgetter
 from backend.fusion.plausible import Entry
 
 _stamp = itemgetter(0)
-TAU = 2.0 * math.pi
 POINTS = 10  # of a slope at most
 
 
 def turn(a: float, b: float, circular: bool) -> float:
     """From b to a: the plain difference, or the shortest way round, in [-pi, pi) [rad]."""
-    return (a - b + math.pi) % TAU - math.pi if circular else a - b
+    return (a - b + math.pi) % math.tau - math.pi if circular else a - b
 
 
 def bracket(entries: tuple[Entry, ...], stamp: float) -> tuple[Entry, Entry, float, float]:

@@ -9,6 +9,7 @@ Marzullo and Owicki 1983). The bounds of the last `WINDOW` seconds are intersect
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -39,15 +40,19 @@ class Clock:
 
     def offset(self, now: float) -> tuple[float, float] | None:
         """Bounds of local minus remote [s] at `now`; None without a recent round trip."""
-        lower, upper = -math.inf, math.inf
-        for at, low, high in self.trips:
-            age = now - at
-            if age <= WINDOW:
-                lower = max(lower, low - DRIFT * age)
-                upper = min(upper, high + DRIFT * age)
-        if upper == math.inf:
-            return None
-        return lower, upper
+        fresh = [trip for trip in self.trips if now - trip.at <= WINDOW]
+        return _intersection(fresh, now) if fresh else None
+
+
+def _intersection(trips: Iterable[Bounds], now: float) -> tuple[float, float]:
+    lower, upper = -math.inf, math.inf
+    for at, low, high in trips:
+        widening = DRIFT * (now - at)
+        if low - widening > lower:
+            lower = low - widening
+        if high + widening < upper:
+            upper = high + widening
+    return lower, upper
 
 
 def update(clock: Clock, sample: ClockSample) -> Clock:
@@ -68,9 +73,10 @@ def update(clock: Clock, sample: ClockSample) -> Clock:
         return Clock(clock.trips, clock.stepped, clock.received, clock.rejected + 1)
     own = DRIFT * (received - sent)  # the offset may have drifted while the trip was under way
     trip = Bounds(received, sent - remote - own, received - remote + own)
-    known = clock.offset(received)
+    # However old, the last trips still tell whether the clock was stepped since.
+    lower, upper = _intersection(clock.trips, received)
     count = clock.received + 1
-    if known is not None and (trip.upper < known[0] or trip.lower > known[1]):
+    if trip.upper < lower or trip.lower > upper:
         return Clock((trip,), received, count, clock.rejected)
     recent = tuple(t for t in clock.trips if received - t.at <= WINDOW)[-(MAX_SAMPLES - 1) :]
     return Clock((*recent, trip), clock.stepped, count, clock.rejected)

@@ -53,10 +53,8 @@ def fuse(rig: Rig, streams: Streams, now: float, common: float) -> FusedPose:
     M = tilt(arm.pitch, arm.roll)
     course = yaw_at(rig, streams, stamp, M, arm)
     base = root_at(rig, streams, stamp, M, arm, course)
-    newest = streams.position.last
-    lost = newest is None or streams.no_fix > newest.stamp
-    fix = Fix.NONE if newest is None or lost else newest.fix
-    status = statuses(streams, now, offset, arm.from_imus)
+    fix = _fix(streams)
+    status = statuses(rig, streams, now, offset, arm.from_imus)
     validity, reasons = judge(rig, streams, now, status, fix, base.sigma, arm.unknown)
     return FusedPose(
         machine=rig.name,
@@ -77,3 +75,13 @@ def fuse(rig: Rig, streams: Streams, now: float, common: float) -> FusedPose:
         streams=status,
         clock_offset=offset[:2] if offset and offset[2] == "offset" else None,
     )
+
+
+def _fix(streams: Streams) -> Fix:
+    """The newest position's quality; NONE before the first, and after a newer "no fix"."""
+    newest = streams.position.last
+    if newest is None:
+        return Fix.NONE
+    entries = streams.position.entries
+    since = entries[-1].stamp if entries else -math.inf
+    return Fix.NONE if streams.no_fix > since else newest.fix

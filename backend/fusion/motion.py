@@ -26,6 +26,7 @@ from backend.spatial.types import Array
 JOINT_WINDOW = 0.1  # of finite-difference joint rates [s]
 BASE_WINDOW = 0.5  # of the base's velocity and yaw rate [s]
 SIGNIFICANT = 3.0  # base rates below this many sigmas are taken for standing still
+FARTHEST = 0.2  # a swing is carried on at its rate no further than this [s]
 LONGEST_GAP = 2.0  # sigma grows no further: the pose is long stale by then [s]
 
 
@@ -63,7 +64,8 @@ class Arm:
                 a, b, fraction, _ = bracket(samples, stamp)
                 found.append(a.value[0] + fraction * turn(b.value[0], a.value[0], wraps))
             else:
-                found.append(swing + rate * (stamp - self.stamp))
+                ahead = max(-FARTHEST, min(FARTHEST, stamp - self.stamp))
+                found.append(swing + rate * ahead)
         return np.array(found)
 
 
@@ -87,19 +89,15 @@ class Place:
 
 def joints_at(rig: Rig, streams: Streams, stamp: float) -> Arm:
     """Joints from joint samples, tilt from an IMU, missing joints from the IMUs of their parts."""
-    config = rig.config
     n = len(rig.continuous)
     entries, at = _series(streams.joints, stamp)
-    q, rates, sigma = [math.nan] * n, [math.nan] * n, config.sigma_joints
+    q, rates, sigma = [math.nan] * n, [math.nan] * n, rig.config.sigma_joints
     if entries:
         q, rates, sigma = _joint_samples(rig, entries, at)
-    readings = {}
-    for name, buffer in streams.attitudes.items():
-        seen, when = _series(buffer, stamp)
-        if seen:
-            sensor = rig.imus[name]
-            readings[sensor.joint] = imu.read(sensor, seen, when, config.max_extrapolation)
+    if not streams.joints.entries:
+        rates = [0.0] * n  # left over from before a clock step: for drawing, at rest
     missing = any(map(math.isnan, q))
+    readings = _readings(rig, streams, stamp, tilt_only=not missing)
     base = imu.up_in_root(rig, readings, q[0])
     if missing and readings:
         q, rates = imu.fill(rig, readings, base, q, rates)
@@ -118,6 +116,25 @@ def joints_at(rig: Rig, streams: Streams, stamp: float) -> Arm:
         stamp=stamp,
         samples=streams.joints.entries,
     )
+
+
+def _readings(rig: Rig, streams: Streams, stamp: float, tilt_only: bool) -> dict[int, imu.Reading]:
+    """The IMUs at `stamp` by the joint that moves them (-1: tracks), the newest of each part.
+
+    tilt_only: those of the arm are not needed.
+    """
+    newest: dict[int, tuple[float, str]] = {}
+    for name, buffer in streams.attitudes.items():
+        joint = rig.imus[name].joint
+        if buffer.last is not None and not (tilt_only and joint > 0):
+            rank = (buffer.last.arrival, name)
+            newest[joint] = max(rank, newest.get(joint, rank))
+    readings = {}
+    for joint, (_, name) in newest.items():
+        entries, at = _series(streams.attitudes[name], stamp)
+        limit = rig.config.max_extrapolation
+        readings[joint] = imu.read(rig.imus[name], entries, at, limit)
+    return readings
 
 
 def _known(values: list[float]) -> Array:

@@ -17,7 +17,6 @@ from backend.fusion.samples import (
     JointSample,
     ProjectedSample,
 )
-from backend.spatial.angles import wrap
 from backend.spatial.types import Array
 
 MAX_STAMP = 1e11  # [s], some 3,000 years
@@ -134,7 +133,9 @@ def heading(rig: Rig, sample: HeadingSample) -> Entry | None:
     if not abs(sample.heading) <= MOST_HEADING or not 0.0 <= sample.variance <= MAX_VARIANCE:
         return None
     sigma = math.sqrt(sample.variance) or rig.config.sigma_heading
-    return Entry(sample.stamp, sample.arrival, (float(wrap(sample.heading)),), (), sigma)
+    return Entry(
+        sample.stamp, sample.arrival, (math.remainder(sample.heading, math.tau),), (), sigma
+    )
 
 
 def attitude(rig: Rig, sample: AttitudeSample) -> Entry | None:

@@ -31,7 +31,6 @@ from backend.fusion.samples import (
     ProjectedSample,
     Sample,
 )
-from backend.spatial.angles import difference
 
 SPAN = 2.0  # of stamps kept [s]
 CAPACITY = 512
@@ -153,7 +152,7 @@ def _take(
     """The streams with `entry` appended to the stream `key`, or the sample counted as rejected."""
     stepped = False
     if entry is not None:
-        timing = _timing(streams, sample.stamp, sample.arrival)
+        timing = _timing(streams, key, sample.stamp, sample.arrival)
         if timing == "impossible":
             entry = None
         elif timing == "step":
@@ -188,14 +187,19 @@ def _take(
     )
 
 
-def _timing(streams: Streams, stamp: float, arrival: float) -> str:
-    """ "possible", "impossible", or "step": the machine's clock was set, begin anew."""
+def _timing(streams: Streams, key: str, stamp: float, arrival: float) -> str:
+    """One of "possible", "impossible", and "step": the machine's clock was set, begin anew."""
     if not plausible.timely(stamp, arrival):
         return "impossible"
     bounds = streams.clock.offset(arrival)
     if bounds is not None:
-        # It cannot have been measured after it arrived.
-        return "possible" if stamp + bounds[0] <= arrival + FUTURE else "impossible"
+        # Nothing is measured after it arrived. By bounds that hold now, what was taken earlier
+        # can lie ahead only if its stamp is from before a step.
+        if stamp + bounds[0] > arrival + FUTURE:
+            return "impossible"
+        entries = streams.buffers.get(key, EMPTY).entries
+        ahead = bool(entries) and entries[-1].stamp + bounds[0] > arrival + FUTURE
+        return "step" if ahead else "possible"
     least = min(streams.delays)
     if least == math.inf or -STEP_AHEAD <= arrival - stamp - least <= STEP_BACK:
         return "possible"
@@ -220,11 +224,12 @@ def _repeats(rig: Rig, key: str, buffer: Buffer, entry: Entry) -> bool:
         for (new, old, fastest), turns in zip(moved, rig.continuous, strict=True):
             step = abs(new - old)
             if step > math.pi and turns:
-                step = abs(float(difference(new, old)))
+                step = abs(math.remainder(new - old, math.tau))
             if step > 0.3 + 3.0 * fastest * dt:
                 return True
     if key == "heading" and dt < 0.5:
-        return abs(float(difference(entry.value[0], newest.value[0]))) > 0.5 + 3.0 * dt
+        turned = math.remainder(entry.value[0] - newest.value[0], math.tau)
+        return abs(turned) > 0.5 + 3.0 * dt
     if key == "position" and dt < 1.0:
         fastest = rig.machine.tracks.max_speed
         return math.dist(entry.value, newest.value) > 5.0 + 3.0 * fastest * dt
@@ -235,8 +240,8 @@ def _lost_fix(streams: Streams, sample: FixSample) -> Streams:
     """A receiver that says it has no fix: known at once, though it gives no position."""
     buffer = streams.position
     since = min(buffer.since, sample.arrival)
-    timing = _timing(streams, sample.stamp, sample.arrival)
-    late = buffer.last is not None and sample.stamp <= buffer.last.stamp
+    timing = _timing(streams, "position", sample.stamp, sample.arrival)
+    late = bool(buffer.entries) and sample.stamp <= buffer.entries[-1].stamp
     bad = timing != "possible" or late or sample.stamp <= streams.no_fix
     counted = Buffer(
         buffer.entries, buffer.last, since, buffer.received + 1, buffer.rejected + int(bad)
@@ -247,7 +252,6 @@ def _lost_fix(streams: Streams, sample: FixSample) -> Streams:
 
 def _forget(streams: Streams) -> Streams:
     """The streams without anything stamped by the old clock; last values and counts stay."""
-
     return replace(
         streams,
         buffers={key: replace(buffer, entries=()) for key, buffer in streams.buffers.items()},

@@ -14,13 +14,16 @@ WORDS = {"joints": "joint angles", "position": "position", "heading": "heading"}
 
 
 def statuses(
+    rig: Rig,
     streams: Streams,
     now: float,
     offset: tuple[float, float, str] | None,
     joints_from_imus: bool,
 ) -> dict[str, StreamStatus]:
-    """Health of "joints", "position", "heading" and "attitude" (all IMUs: the oldest's age).
+    """Health of "joints", "position", "heading" and "attitude".
 
+    "attitude" is as old as the oldest IMU that is needed: those on tracks and upper body, and
+    those of the arm where joints come from them.
     offset: of the machine's clock, `streams.offset(now)`; ages are worst cases of its bounds.
     Joints that come from IMUs are as old as the oldest IMU and the samples that give the rest.
     """
@@ -35,7 +38,11 @@ def statuses(
         rate = buffer.rate(now)
         return StreamStatus(age(buffer), rate, source, buffer.received, buffer.rejected)
 
-    imus = [buffer for buffer in streams.attitudes.values() if buffer.last is not None]
+    imus = [
+        buffer
+        for name, buffer in streams.attitudes.items()
+        if buffer.last is not None and (joints_from_imus or rig.imus[name].joint <= 0)
+    ]
     attitude = StreamStatus(
         age=max((age(buffer) for buffer in imus), default=math.inf),
         rate=min((buffer.rate(now) for buffer in imus), default=0.0),
@@ -73,8 +80,9 @@ def judge(
     """(validity, reasons), the gravest first; no reasons when VALID.
 
     UNKNOWN: a needed stream was never seen, a joint is not published, the machine's clock was
-    stepped within the last second, the receiver has no fix, or the position is known worse than
-    the limit. STALE: a needed stream is older than its limit, or an IMU that has been seen is.
+    stepped within the last second, the receiver has no fix, or a fresh position is known worse
+    than the limit (that of an old one has grown with its age, which is reason enough).
+    STALE: a needed stream, or an IMU that has been seen and is needed, is older than its limit.
     """
     config = rig.config
     reasons = []
@@ -82,6 +90,11 @@ def judge(
         "joints": streams.joints.last is not None or not unknown,
         "position": streams.position.last is not None,
         "heading": streams.heading.last is not None,
+    }
+    limits = {
+        "joints": config.joints_stale,
+        "position": gnss_limit(rig, streams.position),
+        "heading": gnss_limit(rig, streams.heading),
     }
     since_step = now - streams.last_step
     if since_step < config.step_hold:
@@ -91,22 +104,21 @@ def judge(
         reasons += [f"{rig.machine.joints[k].role} angle is not published" for k in unknown]
     if fix is Fix.NONE and streams.position.received:
         reasons.append("no GNSS fix")
-    elif sigma_position > config.sigma_limit and seen["position"]:
+    elif sigma_position > config.sigma_limit and status["position"].age <= limits["position"]:
         reasons.append(
             f"position is known to {sigma_position:.2f} m, limit {config.sigma_limit:.2f} m"
         )
     undetermined = bool(reasons)
-    limits = {
-        "joints": config.joints_stale,
-        "position": gnss_limit(rig, streams.position),
-        "heading": gnss_limit(rig, streams.heading),
-    }
     for key, limit in limits.items():
         if seen[key] and status[key].age > limit:
             reasons.append(_old(WORDS[key], status[key].age, key == "joints"))
-    tilted = any(buffer.last is not None for buffer in streams.attitudes.values())
-    if tilted and status["attitude"].age > config.attitude_stale:
-        reasons.append(_old("attitude", status["attitude"].age, False))
+    attitude = status["attitude"]
+    tilted = any(
+        buffer.last is not None and rig.imus[name].joint <= 0
+        for name, buffer in streams.attitudes.items()
+    )
+    if tilted and attitude.age > config.attitude_stale:
+        reasons.append(_old("attitude", attitude.age, False))
     if undetermined:
         return Validity.UNKNOWN, tuple(reasons)
     return (Validity.STALE if reasons else Validity.VALID), tuple(reasons)

@@ -5,16 +5,19 @@ Every assumption is written to `notes`, which become Machine.assumptions.
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 
 from backend.errors import InputError
 from backend.machine import bodies, kinematics
 from backend.machine.chain import root_poses
+from backend.machine.meshes import triangles_of
 from backend.machine.model import PARTS, ROLES, Antenna, Joint, Link, Machine, Tracks
 from backend.machine.roles import marks_end
 from backend.machine.sidecar import PointOnLink, SelfCollision, Sidecar, TracksTable
-from backend.machine.urdf import Description
-from backend.spatial.boxes import Boxes
+from backend.machine.urdf import Description, UrdfLink
+from backend.spatial import transform
 from backend.spatial.types import Array, frozen
 
 
@@ -33,8 +36,7 @@ def end_point(
     joints: tuple[Joint, ...],
     side: Sidecar,
     file: str,
-    boxes: Boxes,
-    body_links: tuple[int, ...],
+    robot_file: Path,
     notes: list[str],
 ) -> tuple[int, Array]:
     """(index of the link, position in it) of the bucket tip."""
@@ -46,28 +48,33 @@ def end_point(
         if marks_end(robot.joints[i - 1]) and links[i].part == tool:
             notes.append(f"the bucket tip is the origin of link '{links[i].name}'")
             return i, frozen((0.0, 0.0, 0.0), (3,), "end_point")
-    # The farthest corner from the bucket's axis, in the arm plane; across, the bucket's middle.
-    bucket = next(i for i, link in enumerate(links) if link.joint == 3)
+    # The tool's farthest point from the bucket's axis, in the arm plane; across it, the middle.
+    tool_link, bucket = (
+        next(i for i, link in enumerate(links) if link.joint == k) for k in (len(joints) - 1, 3)
+    )
     T_root = root_poses(links, np.zeros(len(joints)))
-    T_bucket_root = np.linalg.inv(T_root[bucket])
-    clouds = [
-        (T_bucket_root @ T_root[i])[:3] @ np.c_[v.vertices, np.ones(len(v.vertices))].T
-        for i, link in enumerate(links)
-        if link.part == tool
-        for v in link.visuals
-    ]
-    clouds += [
-        (T_bucket_root @ T_root[i])[:3] @ np.c_[boxes.corners()[b], np.ones(8)].T
-        for b, i in enumerate(body_links)
-        if links[i].part == tool and not clouds
-    ]
-    points = np.concatenate(clouds, axis=1).T
+    T_bucket_root = transform.inverse(T_root[bucket])
+    points = np.concatenate(
+        [
+            transform.apply(T_bucket_root @ T_root[i], triangles.reshape(-1, 3))
+            for i, link in enumerate(links)
+            if link.part == tool
+            for triangles in _surface(robot.links[i], link, robot_file)
+        ]
+    )
     axis = links[bucket].axis
     across = points @ axis
     flat = points - across[:, None] * axis
     tip = flat[np.argmax(np.linalg.norm(flat, axis=1))] + 0.5 * (across.min() + across.max()) * axis
+    T_tool_bucket = transform.inverse(T_bucket_root @ T_root[tool_link])
     notes.append("the bucket tip is the bucket's farthest point from its pivot")
-    return bucket, frozen(tip, (3,), "end_point")
+    return tool_link, frozen(transform.apply(T_tool_bucket, tip[None])[0], (3,), "end_point")
+
+
+def _surface(stated: UrdfLink, link: Link, robot_file: Path) -> list[Array]:
+    if link.visuals:
+        return [visual.vertices[visual.faces] for visual in link.visuals]
+    return [triangles_of(c, robot_file.parent, str(robot_file)) for c in stated.collisions]
 
 
 def antenna(machine: Machine, stated: PointOnLink | None, file: str, notes: list[str]) -> Antenna:

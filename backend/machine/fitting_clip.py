@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from backend.spatial.types import Array, IntArray
-
-AREA_EPS = 1e-12  # pieces thinner than this [m^2] are dropped when both sides keep their corners
+from backend.machine.fitting_kernels import lattice
+from backend.spatial.types import Array
 
 
 def clip(triangles: Array, normal: Array, offset: float) -> Array:
@@ -55,16 +54,24 @@ def outside_box(triangles: Array, R: Array, low: Array, high: Array) -> Array:
 
 def sample(triangles: Array, spacing: float) -> Array:
     """Points (m, 3) on triangles (n, 3, 3), corners included, none of the surface farther than
-    `spacing` [m] from one: a barycentric lattice per triangle, as fine as its longest edge asks."""
-    edges = np.linalg.norm(triangles - np.roll(triangles, 1, axis=1), axis=2).max(axis=1)
-    steps: IntArray = np.maximum(1, np.ceil(edges / spacing)).astype(np.int64)
-    points = []
-    for k in np.unique(steps):
-        i, j = np.meshgrid(np.arange(k + 1), np.arange(k + 1), indexing="ij")
-        i, j = i[i + j <= k], j[i + j <= k]
-        weights = np.stack([i, j, k - i - j], axis=1) / k
-        points.append((weights @ triangles[steps == k]).reshape(-1, 3))
-    return np.concatenate(points) if points else np.zeros((0, 3))
+    `spacing` [m] from one: rows along each triangle's longest edge."""
+    return np.asarray(lattice(np.ascontiguousarray(triangles), spacing))
+
+
+def subdivided(triangles: Array, longest: float) -> Array:
+    """The same surface in triangles (m, 3, 3) with no edge over `longest` [m], by halving edges."""
+    done = []
+    while len(triangles):
+        edges = np.linalg.norm(triangles - np.roll(triangles, -1, axis=1), axis=2)
+        short = edges.max(axis=1) <= longest
+        done.append(triangles[short])
+        t, first = triangles[~short], np.argmax(edges[~short], axis=1)
+        t = np.take_along_axis(t, ((first[:, None] + np.arange(3)) % 3)[:, :, None], axis=1)
+        middle = (t[:, 0] + t[:, 1]) / 2.0
+        triangles = np.concatenate(
+            [np.stack([t[:, 0], middle, t[:, 2]], 1), np.stack([middle, t[:, 1], t[:, 2]], 1)]
+        )
+    return np.concatenate(done) if done else triangles
 
 
 def thin(points: Array, spacing: float) -> Array:

@@ -19,16 +19,6 @@ class Field:
     step: float
     distance: Array
 
-    def at(self, points: Array) -> Array:
-        """Distance (...,) [m] to the mesh at points (..., 3) [m]; the nearest grid node's."""
-        index = np.rint((points - self.origin) / self.step).astype(np.intp)
-        index = np.clip(index, 0, np.array(self.distance.shape) - 1)
-        return np.asarray(self.distance[index[..., 0], index[..., 1], index[..., 2]])
-
-    def excess(self, R: Array, low: Array, high: Array) -> float:
-        """Largest distance to the mesh over the surface of the box low <= R^T p <= high [m]."""
-        return float(self.at(box_surface(low, high, 0.05) @ R.T).max())
-
 
 def box_surface(low: Array, high: Array, spacing: float) -> Array:
     """Points (n, 3) on the six faces of low <= p <= high, at most `spacing` [m] apart."""

@@ -68,11 +68,11 @@ def load_machine(
     swept = swept_by_cylinders(links, joints, side, robot_file, side_name, progress)
     boxes, body_links = _bodies(robot, links, swept, side, robot_file, progress)
     end_link, end_point = defaults.end_point(
-        robot, links, joints, side, side_name, boxes, body_links, notes
+        robot, links, joints, side, side_name, robot_file, notes
     )
     arm, sun = sun_map.derive(links, joints, end_link, end_point, file)
     machine = Machine(
-        name=model if robot_file.parent.parent == SHIPPED else robot.name,
+        name=robot_file.parent.name if robot_file.parent.parent == SHIPPED else robot.name,
         title=side.title or robot.name,
         joints=joints,
         links=links,

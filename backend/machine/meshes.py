@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 from functools import lru_cache
 from pathlib import Path
+from typing import TypeAlias
 
 import numpy as np
 import trimesh
@@ -21,7 +22,9 @@ from backend.machine.urdf import Color, Geometry
 from backend.spatial import transform
 from backend.spatial.types import AnyArray, Array
 
+Surface: TypeAlias = tuple[Array, AnyArray, Color | None]
 GREY: Color = (150, 150, 145)
+_COLORS = 6  # a mesh is drawn in at most so many colours
 _UNIT = re.compile(rb"<unit\b[^>]*\bmeter\s*=\s*[\"']([^\"']+)[\"']")
 
 
@@ -46,9 +49,7 @@ def mesh_triangles(path: Path) -> Array:
     return np.concatenate([vertices[faces] for vertices, faces, _ in _load(path, str(path))])
 
 
-def _surfaces(
-    geometry: Geometry, folder: Path, file: str
-) -> list[tuple[Array, AnyArray, Color | None]]:
+def _surfaces(geometry: Geometry, folder: Path, file: str) -> list[Surface]:
     if geometry.kind == "mesh":
         loaded = _load(find_mesh(geometry.filename, folder, file), file)
         scale = np.array(geometry.size)
@@ -64,8 +65,13 @@ def _surfaces(
     return [(np.array(solid.vertices, dtype=float), np.array(solid.faces), None)]
 
 
+def _load(path: Path, file: str) -> list[Surface]:
+    state = path.stat()
+    return list(_load_version(path, state.st_mtime_ns, state.st_size, file))
+
+
 @lru_cache(maxsize=64)
-def _load(path: Path, file: str) -> list[tuple[Array, AnyArray, Color | None]]:
+def _load_version(path: Path, _modified: int, _size: int, file: str) -> tuple[Surface, ...]:
     try:
         scene = trimesh.load_scene(str(path))
         meshes = [m for m in scene.dump(concatenate=False) if isinstance(m, trimesh.Trimesh)]
@@ -73,16 +79,16 @@ def _load(path: Path, file: str) -> list[tuple[Array, AnyArray, Color | None]]:
     except Exception as error:
         words = " ".join(str(error).split()) or type(error).__name__
         raise InputError(f"{file}: mesh {path} cannot be read: {words}.") from None
-    surfaces: list[tuple[Array, AnyArray, Color | None]] = []
+    surfaces: list[Surface] = []
     scale = _unit(path)
     for mesh in meshes:
         vertices = np.array(mesh.vertices, dtype=float) * scale
         faces = np.array(mesh.faces, dtype=np.int64)
         if len(faces) and np.isfinite(vertices).all():
-            surfaces.extend((vertices, part, color) for part, color in _by_color(mesh, faces))
+            surfaces.extend(_by_color(vertices, faces, _face_colors(mesh)))
     if not surfaces:
         raise InputError(f"{file}: mesh {path} holds no triangles.")
-    return surfaces
+    return tuple(surfaces)
 
 
 def _unit(path: Path) -> float:
@@ -92,26 +98,38 @@ def _unit(path: Path) -> float:
     return float(found.group(1)) if found else 1.0
 
 
-def _by_color(mesh: trimesh.Trimesh, faces: AnyArray) -> list[tuple[AnyArray, Color | None]]:
-    """The faces split by colour; textures are sampled, at most a few colours are kept."""
-    try:
-        visual = mesh.visual.to_color() if mesh.visual.kind == "texture" else mesh.visual
-        colors = np.asarray(visual.face_colors)[:, :3]
-    # A texture that is missing or unreadable costs the colour, not the machine.
-    except Exception:
-        return [(faces, None)]
-    if len(colors) != len(faces) or not mesh.visual.defined:
-        return [(faces, None)]
-    coarse = colors.astype(int) // 48
-    keys, inverse, counts = np.unique(coarse, axis=0, return_inverse=True, return_counts=True)
-    inverse = inverse.reshape(-1)
-    if len(keys) > 12:
-        keep = np.argsort(-counts)[:12]
-        nearest = np.argmin(np.abs(keys[:, None] - keys[keep][None]).sum(axis=-1), axis=1)
-        inverse = keep[nearest][inverse]
-    parts: list[tuple[AnyArray, Color | None]] = []
-    for key in np.unique(inverse):
-        chosen = inverse == key
+def _face_colors(mesh: trimesh.Trimesh) -> AnyArray | None:
+    """(faces, 3) 0..255, or None when the mesh has none; a texture is read at faces' middles."""
+    visual = mesh.visual
+    if not visual.defined:
+        return None
+    if visual.kind != "texture":
+        return np.asarray(visual.face_colors)[:, :3].astype(int)
+    material = visual.material
+    image = getattr(material, "baseColorTexture", None) or getattr(material, "image", None)
+    if image is None or visual.uv is None:
+        return np.tile(np.asarray(material.main_color)[:3].astype(int), (len(mesh.faces), 1))
+    pixels = np.asarray(image.convert("RGB"))
+    uv = np.asarray(visual.uv)[np.asarray(mesh.faces)].mean(axis=1) % 1.0
+    height, width = pixels.shape[:2]
+    columns = np.minimum((uv[:, 0] * width).astype(int), width - 1)
+    rows = np.minimum(((1.0 - uv[:, 1]) * height).astype(int), height - 1)
+    return np.asarray(pixels[rows, columns], dtype=int)
+
+
+def _by_color(vertices: Array, faces: AnyArray, colors: AnyArray | None) -> list[Surface]:
+    """The mesh split into a few colours; each piece keeps only its own vertices."""
+    if colors is None:
+        return [(vertices, faces, None)]
+    keys, group, counts = np.unique(colors // 48, axis=0, return_inverse=True, return_counts=True)
+    group = group.reshape(-1)
+    keep = np.argsort(-counts)[:_COLORS]
+    nearest = np.argmin(np.abs(keys[:, None] - keys[keep][None]).sum(axis=-1), axis=1)
+    group = nearest[group]
+    surfaces: list[Surface] = []
+    for k in np.unique(group):
+        chosen = group == k
         r, g, b = (int(c) for c in np.median(colors[chosen], axis=0))
-        parts.append((faces[chosen], (r, g, b)))
-    return parts
+        used, renumbered = np.unique(faces[chosen], return_inverse=True)
+        surfaces.append((vertices[used], renumbered.reshape(-1, 3), (r, g, b)))
+    return surfaces

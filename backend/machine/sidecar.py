@@ -112,7 +112,9 @@ def read_sidecar(path: Path) -> Sidecar:
 
 
 def _sentence(path: Path, error: ValidationError) -> str:
-    first = error.errors()[0]
+    # A misspelt key also leaves the right one missing: say the misspelling first.
+    found = error.errors()
+    first = next((e for e in found if e["type"] == "extra_forbidden"), found[0])
     place = [str(part) for part in first["loc"] if part != "[key]"]
     field = ".".join(place)
     if first["type"] == "extra_forbidden":

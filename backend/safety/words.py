@@ -34,20 +34,21 @@ def directions(machine: Machine) -> dict[str, tuple[str, str]]:
 
 def line(concern: Concern, labels: dict[str, str]) -> str:
     """`LEVEL · MACHINE part ↔ cause · value`, at most 50 characters."""
-    own = labels.get(concern.machine, concern.machine.upper())
     evidence = concern.evidence
     if concern.level is Level.UNKNOWN or evidence is None or not evidence.other:
-        return _fit(f"{concern.level.name} · {own} · {concern.reason}")
+        return _fit(f"{concern.level.name} · {concern.reason}")
+    own = labels.get(concern.machine, concern.machine.upper())
     other_machine, _, _ = evidence.other.partition(":")
     other = f"{labels.get(other_machine, other_machine.upper())} {part(evidence.other)}"
     value = f"{max(evidence.distance, 0.0):.2f} m"
     return _fit(f"{concern.level.name} · {own} {part(evidence.own)} ↔ {other} · {value}")
 
 
-def detail(concern: Concern, machine: Machine) -> str:
+def detail(concern: Concern, machine: Machine, labels: dict[str, str]) -> str:
     """What is limited and which levers are free."""
     if concern.level is Level.UNKNOWN:
-        return "Clearance unknown. Do not move. Check the radio and sensors of the machine named."
+        own = labels.get(concern.machine, concern.machine.upper())
+        return f"Clearance unknown: do not move {own}. Check radio and sensors of the one named."
     limited, free = [], []
     for joint, allowed, words in zip(
         machine.joints, concern.allowed, directions(machine).values(), strict=True

@@ -31,11 +31,14 @@ def camera_names(site: SceneSite) -> tuple[str, ...]:
     return ("site", "plan", "follow", *(f"behind {name}" for name in site.machines))
 
 
-def camera_pose(name: str, site: SceneSite, snapshot: Snapshot | None, own: str) -> CameraPose:
+def camera_pose(
+    name: str, site: SceneSite, snapshot: Snapshot | None, own: str, aspect: float = ASPECT
+) -> CameraPose:
     """The camera called `name`, for the machines where they are now.
 
     "behind left" takes a machine's name or label, in any case; "follow" is behind `own` and is
-    asked for again in each cycle. Raises ValueError naming the cameras there are.
+    asked for again in each cycle. aspect: width to height of the picture.
+    Raises ValueError naming the cameras there are.
     """
     placed = _placed(snapshot)
     if name == "follow":
@@ -46,10 +49,10 @@ def camera_pose(name: str, site: SceneSite, snapshot: Snapshot | None, own: str)
             if wanted in (machine.lower(), entry.label.lower()):
                 return _behind(site, machine, placed)
     center, across, along = extent(site, snapshot)
-    radius = max(along, across / ASPECT)
+    radius = max(along, across / min(max(aspect, 0.5), ASPECT))
     if name == "plan":
         # A hair south of straight down, so that north is up.
-        height = 1.2 * radius / np.tan(PLAN_FOV / 2.0)
+        height = 1.25 * radius / np.tan(PLAN_FOV / 2.0)
         above = center + np.array([0.0, -0.002 * height, height])
         return CameraPose(above, center, float(PLAN_FOV))
     if name == "site":

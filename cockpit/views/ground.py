@@ -12,7 +12,7 @@ from cockpit.views.shapes import Float32, box_mesh, feature_edges, polyline
 
 MAJOR = 10.0  # [m] between labelled lines; 5 on a small site
 MINOR = 0.2  # as a share of the labelled distance
-LETTER = 0.034  # height, as a share of half the ground's side
+LETTER = 0.03  # height, as a share of half the ground's side
 
 
 def light(scene: viser.SceneApi) -> None:

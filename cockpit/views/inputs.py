@@ -66,6 +66,9 @@ class ZoneImage(Protocol):
     @property
     def zone(self) -> Array: ...
 
+    @property
+    def state_time(self) -> float: ...
+
 
 class SnapshotSource(Protocol):
     """The newest snapshot and images; a hub."""

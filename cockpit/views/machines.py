@@ -78,12 +78,12 @@ class MachineNodes:
                 receive_shadow=False,
             )
             self._paint.append((handle, color))
-            edges = feature_edges(vertices, faces)
-            if len(edges):
-                _lines(scene, f"{root}/{k}/edges", edges, palette.EDGE, 1.2)
+        edges = np.concatenate([feature_edges(vertices, faces) for vertices, faces, _ in meshes])
+        if len(edges):
+            _lines(scene, f"{root}/edges", edges, palette.EDGE, 1.2)
 
     def _plain(self, link: int) -> palette.Rgb:
-        """The colour of a link whose description gives none, or the same one to the whole machine."""
+        """The colour of a link in a machine described without colours, or with a single one."""
         dark = self._entry.model.links[link].part in ("tracks", "bucket")
         return palette.IRON if dark else palette.PAINT
 

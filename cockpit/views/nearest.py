@@ -20,9 +20,9 @@ class PairNodes:
     def __init__(self, scene: viser.SceneApi, site: SceneSite) -> None:
         self._scene = scene
         self._site = site
-        # The label floats over the line, not on it.
+        # The label hangs under the line, clear of the arms and of the names over the machines.
         reach = min(entry.model.max_reach for entry in site.machines.values())
-        self._lift = np.array([0.0, 0.0, 0.05 * reach])
+        self._drop = np.array([0.0, 0.0, 0.03 * reach])
         self._drawn: dict[tuple[str, str], tuple[viser.LineSegmentsHandle, Words]] = {}
         self._levels: dict[tuple[str, str], Level] = {}
 
@@ -53,7 +53,7 @@ class PairNodes:
             self._levels[key] = level
         if np.abs(line.points[0] - points).max() > 5e-4:
             line.points = points[None].astype(np.float32)
-            words.label.position = points.mean(axis=0) + self._lift
+            words.label.position = points.mean(axis=0) - self._drop
         words.show(distance_text(pair.distance, level, pair.near), level, now)
 
     def _hide(self, key: tuple[str, str]) -> None:
@@ -73,7 +73,7 @@ class PairNodes:
                 thickness_units="screen",
             )
             label = self._scene.add_label(
-                f"{name}/distance", "", font_screen_scale=1.6, anchor="bottom-center"
+                f"{name}/distance", "", font_screen_scale=1.6, anchor="top-center"
             )
             self._drawn[key] = (line, Words(label))
         return self._drawn[key]

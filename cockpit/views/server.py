@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, NoReturn
 
 import numpy as np
@@ -14,10 +15,13 @@ from viser import _messages
 
 from backend.pipeline.records import Snapshot
 from cockpit.views import palette
-from cockpit.views.cameras import CameraPose, camera_pose
+from cockpit.views.cameras import ASPECT, CameraPose, camera_pose
 from cockpit.views.inputs import SceneSite, SnapshotSource
 from cockpit.views.scene import Scene
 from cockpit.views.zone import OwnNodes
+
+HEAD = (Path(__file__).parent / "client_head.html").read_text(encoding="utf-8")
+"""Put in the head of viser's client page by whoever serves it to browsers."""
 
 RATE = 25.0  # updates a second while somebody looks
 IDLE_RATE = 2.0  # while nobody does
@@ -122,6 +126,8 @@ class View:
                 self._own = name
             for client_id, client in clients.items():
                 old = self._browsers.get(client_id)
+                if old is not None and old.own != name:
+                    old.remove()
                 if old is None or old.own != name:
                     self._browsers[client_id] = self._own_nodes(client, name)
         snapshot = self._source.latest()
@@ -139,7 +145,7 @@ class View:
             for client_id, client in clients.items():
                 nodes = self._browsers.get(client_id)
                 own = nodes.own if nodes is not None else self._own
-                pose = camera_pose(name, self._site, snapshot, own)
+                pose = camera_pose(name, self._site, snapshot, own, client.camera.aspect)
                 self._following.pop(client_id, None)
                 if name == "follow":
                     self._following[client_id] = pose
@@ -226,6 +232,11 @@ class View:
             if client.client_id not in self._browsers:
                 self._browsers[client.client_id] = self._own_nodes(client, self._own)
         snapshot = self._source.latest()
+        if client.camera.aspect < ASPECT:  # the initial camera would cut off both sides
+            _aim(
+                client,
+                camera_pose(self._camera, self._site, snapshot, self._own, client.camera.aspect),
+            )
         if snapshot is not None:
             self._draw_own(snapshot)
 

@@ -34,6 +34,10 @@ class OwnNodes:
         )
         self._zones: dict[str, ZoneNodes] = {}
 
+    def remove(self) -> None:
+        """Take all of it out of the browser."""
+        self._scene.remove_by_name("/own")
+
     def update(
         self, snapshot: Snapshot, images: SnapshotSource, ground: float, lost: float
     ) -> None:
@@ -44,9 +48,11 @@ class OwnNodes:
         if body is not None:
             x, y, _ = body.swing_center
             self._cross.position = (float(x), float(y), ground + 0.03)
+        # No images are made of far pairs: an old zone would only look like a warning.
+        far = {frozenset((pair.a, pair.b)) for pair in snapshot.pairs if not pair.near}
         for partner in snapshot.machines:
             image = None
-            if partner != self.own:
+            if partner != self.own and frozenset((self.own, partner)) not in far:
                 image = images.image("sun", f"{self.own}<-{partner}")
             if image is not None and partner not in self._zones:
                 self._zones[partner] = ZoneNodes(self._scene, f"/own/zone/{partner}")
@@ -90,7 +96,7 @@ class ZoneNodes:
         if image is None:
             return
         self._root.position = (0.0, 0.0, ground + 0.015)
-        old = not now - float(getattr(image, "state_time", now)) <= OLD
+        old = not now - image.state_time <= OLD
         if old != self._old:
             self._old = old
             self._fill.visible = not old

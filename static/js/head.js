@@ -5,11 +5,15 @@ import { seconds } from "./axis.js";
 
 export const ageLevel = (age) => (age > 1 ? "stale" : age > 0.5 ? "old" : "fresh");
 
+export const staleText = (age) => (Number.isFinite(age) ? `STALE ${seconds(age)}` : "STALE");
+
 /** "0.1 s", or "STALE 1.4 s" when over a second old. */
 export function ageText(age) {
   if (!Number.isFinite(age)) return "no data";
-  return age > 1 ? `STALE ${seconds(age)}` : seconds(age);
+  return age > 1 ? staleText(age) : seconds(age);
 }
+
+const brief = (panel) => panel.clientWidth < 300 || panel.clientHeight < 60;
 
 export function head(panel) {
   const who = panel.querySelector(".who");
@@ -17,9 +21,12 @@ export function head(panel) {
   const writeAge = age && slowText(age);
   return {
     who: (text) => who && write(who, text),
-    age: (value) => {
-      const level = ageLevel(value);
-      writeAge(ageText(value), level);
+    // A panel too small for the word STALE has it on its canvas; the number stays in the header.
+    age: (value, forced = false) => {
+      const level = forced ? "stale" : ageLevel(value);
+      const full = forced ? staleText(value) : ageText(value);
+      const text = brief(panel) && Number.isFinite(value) ? seconds(value) : full;
+      writeAge(text, level);
       const name = `age ${level}`;
       if (age.className !== name) age.className = name;
       panel.classList.toggle("stale", level === "stale");

@@ -3,8 +3,8 @@
 import { connect } from "./socket.js";
 import { readSizes } from "./theme.js";
 import { $ } from "./words.js";
-import { metres } from "./axis.js";
-import { accept, choose, image, imageAge, label, link, machine, names, silence, snapshotAge, state } from "./state.js";
+import { number } from "./axis.js";
+import { accept, choose, image, imageAge, imageStale, label, link, machine, names, silence, snapshotAge, state } from "./state.js";
 import { head } from "./head.js";
 import * as hover from "./hover.js";
 import * as alarm from "./alarm.js";
@@ -60,6 +60,7 @@ function onKey(event) {
   else if (event.key === "Escape") {
     hover.hide();
     alarm.showList(false);
+    $("help").close();
   } else return;
   event.preventDefault();
 }
@@ -67,7 +68,7 @@ function onKey(event) {
 function help() {
   const dialog = $("help");
   if (dialog.open) dialog.close();
-  else dialog.showModal();
+  else dialog.show(); // not modal: the alarm line below stays in sight and in reach
 }
 
 state.own = sessionStorage.getItem("own") ?? undefined;
@@ -86,7 +87,6 @@ addEventListener("resize", () => {
 const scheme = location.protocol === "https:" ? "wss:" : "ws:";
 const socket = connect(`${scheme}//${location.host}/ws`, onFrame, (word) => {
   state.socket = word;
-  if (word === "open" && state.own) socket?.send({ type: "own", machine: state.own });
 });
 
 
@@ -96,6 +96,7 @@ function onFrame(header, arrays) {
   accept(header, arrays);
   if (header.type === "site") {
     updateCameras(socket.send);
+    socket.send({ type: "own", machine: state.own });
     for (const s of [...live, ...images]) s.dirty = true;
   } else if (header.type === "snapshot") {
     push(latency.arrival, Date.now() - 1000 * header.wall);
@@ -109,8 +110,8 @@ function onFrame(header, arrays) {
 
 /** Words, ages and levels: ten times a second whether or not anything arrives. */
 function tick() {
-  topbar.update();
   alarm.update();
+  topbar.update();
   demo.update();
   updateCameras(socket.send);
   const subject = `${label(state.own)}`;
@@ -119,19 +120,20 @@ function tick() {
   const m = machine(state.own);
   heads.scene.who(state.site ? `${names().length} machines` : "");
   heads.plan.who(`${subject}`);
-  heads.reach.who(`${subject}${Number.isFinite(m?.end_point?.[2]) ? ` · tip ${metres(m.end_point[2])}` : ""}`);
+  heads.reach.who(`${subject}${Number.isFinite(m?.end_point?.[2]) && plots.reach.width >= 300 ? ` · tip ${number(m.end_point[2], 1)} m` : ""}`);
   for (const name of ["bars", "limits"]) heads[name].who(subject);
   heads.trends.who(state.partner ? `${subject} ↔ ${label(state.partner)}` : subject);
-  for (const name of ["scene", "bars", "limits", "trends", "timeline"]) heads[name].age(age);
-  heads.plan.age(image() ? Math.max(age, old) : age);
-  for (const name of ["reach", "slice-0", "slice-1", "slice-2"]) heads[name].age(old);
+  for (const name of ["scene", "plan", "bars", "limits", "trends", "timeline"]) heads[name].age(age);
+  const forced = Boolean(image()) && imageStale(image());
+  for (const name of ["reach", "slice-0", "slice-1", "slice-2"]) heads[name].age(old, forced);
   // Ages and hollow stars must go on while nothing arrives.
-  if (old > 0.5) for (const s of images) s.dirty = true;
+  if (old > 0.5 || forced) for (const s of images) s.dirty = true;
   if (link() !== "ok" && state.snapshot) for (const s of live) s.dirty = true;
   hover.refresh();
 }
 
 function frame(now) {
+  requestAnimationFrame(frame);
   let drawn = false;
   for (const [s, period] of PERIOD) {
     // A picture that only grows old needs no more than two drawings a second.
@@ -141,9 +143,8 @@ function frame(now) {
   if (drawn && waitingToDraw !== null) {
     push(latency.drawn, Date.now() - 1000 * waitingToDraw);
     waitingToDraw = null;
-    if (image() && document.body.dataset.ready !== "1") document.body.dataset.ready = "1";
+    if ((image() || names().length < 2) && document.body.dataset.ready !== "1") document.body.dataset.ready = "1";
   }
-  requestAnimationFrame(frame);
 }
 
 setInterval(tick, 100);
@@ -155,4 +156,6 @@ window.cockpit = Object.freeze({
   get state() { return state; },
   get latency() { return { arrival: quantiles(latency.arrival), drawn: quantiles(latency.drawn) }; },
   get link() { return link(); },
+  get rejected() { return socket.rejected(); },
+  get paint() { return Object.fromEntries([...PERIOD.keys()].map((s) => [s.canvas.id, Math.round(s.cost * 100) / 100])); },
 });

@@ -1,49 +1,66 @@
 // Sun's joint sets as pixels: every cell of the (m, n) mesh becomes a filled quadrilateral.
 
-/** Fills the triangle into `mask` (w by h), every pixel it touches along x. */
-function triangle(mask, w, h, x0, y0, x1, y1, x2, y2) {
-  const top = Math.max(0, Math.floor(Math.min(y0, y1, y2)));
-  const bottom = Math.min(h - 1, Math.floor(Math.max(y0, y1, y2)));
+let low = 0; // ends of the present row's span; module variables because this is the inner loop
+let high = 0;
+
+/** Widens the span by the part of an edge inside the row of pixels from y to y + 1. */
+function widen(y, ax, ay, bx, by) {
+  if (ay > by) {
+    const x = ax, z = ay;
+    ax = bx; ay = by; bx = x; by = z;
+  }
+  if (ay > y + 1 || by < y) return;
+  let p = ax, q = bx;
+  if (by > ay) {
+    const slope = (bx - ax) / (by - ay);
+    if (ay < y) p = ax + (y - ay) * slope;
+    if (by > y + 1) q = ax + (y + 1 - ay) * slope;
+  }
+  if (p < low) low = p;
+  if (p > high) high = p;
+  if (q < low) low = q;
+  if (q > high) high = q;
+}
+
+/** Fills every pixel of `mask` (w by h) that the convex cell a-b-d-c touches along x, so that thin cells are kept. */
+function cell(mask, w, h, ax, ay, bx, by, dx, dy, cx, cy) {
+  const top = Math.max(0, Math.floor(Math.min(ay, by, cy, dy)));
+  const bottom = Math.min(h - 1, Math.floor(Math.max(ay, by, cy, dy)));
   for (let y = top; y <= bottom; y++) {
-    // The part of the triangle inside this row of pixels, so that thin cells are not lost.
-    let from = Infinity;
-    let to = -Infinity;
-    const edge = (ax, ay, bx, by) => {
-      const low = Math.max(y, Math.min(ay, by));
-      const high = Math.min(y + 1, Math.max(ay, by));
-      if (low > high) return;
-      const slope = by === ay ? 0 : (bx - ax) / (by - ay);
-      const p = by === ay ? ax : ax + (low - ay) * slope;
-      const q = by === ay ? bx : ax + (high - ay) * slope;
-      from = Math.min(from, p, q);
-      to = Math.max(to, p, q);
-    };
-    edge(x0, y0, x1, y1);
-    edge(x1, y1, x2, y2);
-    edge(x2, y2, x0, y0);
-    if (from > to) continue;
-    const start = Math.max(0, Math.floor(from));
-    const end = Math.min(w - 1, Math.floor(to));
-    if (start <= end) mask.fill(1, y * w + start, y * w + end + 1);
+    low = Infinity;
+    high = -Infinity;
+    widen(y, ax, ay, bx, by);
+    widen(y, bx, by, dx, dy);
+    widen(y, dx, dy, cx, cy);
+    widen(y, cx, cy, ax, ay);
+    const from = y * w + Math.max(0, Math.floor(low));
+    const to = y * w + Math.min(w - 1, Math.floor(high));
+    for (let p = from; p <= to; p++) mask[p] = 1;
   }
 }
+
+let px = new Float64Array(0);
+let py = new Float64Array(0);
 
 /** xs, ys: rows by columns mesh values; mapX, mapY to pixels. Returns the number of cells filled. */
 export function fillMesh(mask, w, h, xs, ys, rows, columns, mapX, mapY) {
   mask.fill(0);
+  const n = rows * columns;
+  if (px.length < n) {
+    px = new Float64Array(n);
+    py = new Float64Array(n);
+  }
+  for (let k = 0; k < n; k++) {
+    px[k] = mapX(xs[k]);
+    py[k] = mapY(ys[k]);
+  }
   let cells = 0;
   for (let i = 0; i + 1 < rows; i++) {
     for (let j = 0; j + 1 < columns; j++) {
-      const a = i * columns + j;
-      const b = a + 1;
-      const c = a + columns;
-      const d = c + 1;
-      const sum = xs[a] + xs[b] + xs[c] + xs[d] + ys[a] + ys[b] + ys[c] + ys[d];
-      if (!(sum === sum)) continue; // a corner is out of reach (NaN)
+      const a = i * columns + j, b = a + 1, c = a + columns, d = c + 1;
+      if (Number.isNaN(px[a] + px[b] + px[c] + px[d] + py[a] + py[b] + py[c] + py[d])) continue; // a corner is out of reach
       cells += 1;
-      const ax = mapX(xs[a]), ay = mapY(ys[a]), dx = mapX(xs[d]), dy = mapY(ys[d]);
-      triangle(mask, w, h, ax, ay, mapX(xs[b]), mapY(ys[b]), dx, dy);
-      triangle(mask, w, h, ax, ay, mapX(xs[c]), mapY(ys[c]), dx, dy);
+      cell(mask, w, h, px[a], py[a], px[b], py[b], px[d], py[d], px[c], py[c]);
     }
   }
   return cells;

@@ -32,12 +32,6 @@ export function segment(g, x0, y0, x1, y1, colour, width = 1, dash = null) {
   if (dash) g.setLineDash([]);
 }
 
-export function polygon(g, points, mapX, mapY) {
-  g.beginPath();
-  for (const [x, y] of points) g.lineTo(mapX(x), mapY(y));
-  g.closePath();
-}
-
 /** What a plot says when it has nothing to draw. */
 export function message(g, width, height, text) {
   label(g, text, width / 2, height / 2, { align: "center", base: "middle", name: "t3" });

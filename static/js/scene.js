@@ -1,6 +1,6 @@
 // The embedded 3D scene and its camera buttons. The page's keys work inside the frame, too.
 
-import { $, make, write } from "./words.js";
+import { $, make } from "./words.js";
 import { label, names, state } from "./state.js";
 
 let built = "";
@@ -27,9 +27,4 @@ export function updateCameras(send) {
     button.addEventListener("click", () => send({ type: "camera", name }));
     return button;
   }));
-}
-
-export function note(text) {
-  $("scene-note").hidden = !text;
-  write($("scene-note"), text);
 }

@@ -45,6 +45,8 @@ export function connect(url, onFrame, onState) {
         return;
       }
       onFrame(frame.header, frame.arrays);
+      // The server sends no more snapshots than are acknowledged: a busy page gets fewer, never late ones.
+      if (frame.header.type === "snapshot") send({ type: "ack", cycle: frame.header.cycle });
     };
     socket.onclose = () => {
       onState("closed");

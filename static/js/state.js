@@ -110,7 +110,16 @@ export function snapshotAge() {
 /** Age of an image's state, by the server's clock as the newest snapshot carries it. */
 export function imageAge(entry) {
   if (!entry || !state.snapshot) return Infinity;
-  return Math.max(0, state.snapshot.time - entry.header.state_time) + silence();
+  const own = Math.max(0, state.snapshot.time - entry.header.state_time) + silence();
+  // A picture is no younger than the pose of a machine that has gone silent.
+  const invalid = [entry.header.own, entry.header.partner].filter((name) => machine(name) && machine(name).validity !== "VALID");
+  return Math.max(own, ...invalid.map(dataAge));
+}
+
+/** Too old, or computed from a machine whose own data are not valid. */
+export function imageStale(entry) {
+  if (!entry) return true;
+  return imageAge(entry) > 1 || [entry.header.own, entry.header.partner].some((name) => machine(name)?.validity !== "VALID");
 }
 
 export function link() {

@@ -1,5 +1,6 @@
 // A canvas that fits its box at the screen's resolution, carries what it shows, and answers the pointer.
 
+import { clear, message } from "./pen.js";
 import { mark } from "./words.js";
 
 /**
@@ -9,7 +10,7 @@ import { mark } from "./words.js";
  */
 export function surface(canvas, paint, probe) {
   const g = canvas.getContext("2d", { alpha: false });
-  const s = { canvas, probe, width: 0, height: 0, dirty: true, last: -Infinity, lastLabel: -Infinity };
+  const s = { canvas, probe, width: 0, height: 0, dirty: true, last: -Infinity, lastLabel: -Infinity, cost: 0 };
 
   new ResizeObserver(() => {
     const dpr = window.devicePixelRatio || 1;
@@ -29,7 +30,19 @@ export function surface(canvas, paint, probe) {
     s.dirty = false;
     s.last = now;
     g.setTransform(s.dpr, 0, 0, s.dpr, 0, 0);
-    const shown = paint(g, s.width, s.height, s.dpr);
+    const start = performance.now();
+    let shown;
+    try {
+      shown = paint(g, s.width, s.height, s.dpr);
+    } catch (error) {
+      // One plot that fails must neither stop the others nor keep showing an old picture.
+      console.error(error);
+      g.setTransform(s.dpr, 0, 0, s.dpr, 0, 0);
+      clear(g, s.width, s.height);
+      message(g, s.width, s.height, "cannot draw");
+      shown = { state: { error: String(error) }, age: Infinity, label: "This plot cannot be drawn" };
+    }
+    s.cost += 0.05 * (performance.now() - start - s.cost); // running mean [ms]
     if (shown) {
       mark(canvas, "state", JSON.stringify(shown.state));
       mark(canvas, "age", Number.isFinite(shown.age) ? shown.age.toFixed(2) : "none");

@@ -53,7 +53,7 @@ export function update() {
   const how = link();
   mark(document.body, "link", how);
   mark($("link"), "link", how);
-  write($("link-word"), { ok: "LINK OK", slow: "▲ LINK SLOW", lost: "LINK LOST", connecting: "connecting" }[how]);
+  write($("link-word"), { ok: "LINK OK", slow: "▲ LINK", lost: "LINK LOST", connecting: "connecting" }[how]);
   const delay = state.delays.length ? Math.max(0, state.delays[state.delays.length - 1]) : NaN;
   if (how === "ok") linkAge(Number.isFinite(delay) && delay < 10 ? `${number(delay * 1000, 0)} ms` : "clock differs", how);
   else linkAge(s ? `${seconds(silence())} ago` : "", how);
@@ -86,7 +86,7 @@ export function update() {
     const age = dataAge(name);
     const hz = m.rates?.joints;
     const text = Number.isFinite(age) ? `${number(age, 2)} s` : "no data";
-    parts.numbers(`${text} · ${Number.isFinite(hz) ? `${number(hz, 0)} Hz` : "– Hz"}`, validity);
+    parts.numbers(machines.size > 2 ? text : `${text} · ${Number.isFinite(hz) ? `${number(hz, 0)} Hz` : "– Hz"}`, validity);
     parts.button.setAttribute("aria-label", `${label(name)}, ${validity}, ${fixWord(m.fix)}`);
   }
 }

@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from conftest import Motion, World, feed, pose_at
+from fusion_world import Motion, World, feed, pose_at
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -105,3 +105,16 @@ def test_a_lost_imu_makes_the_pose_stale_not_level(rig: Rig) -> None:
     assert pose.validity is Validity.STALE
     assert pose.reasons == ("attitude is 1.1 s old",)
     assert pose.pitch == pytest.approx(0.1, abs=1e-6)
+
+
+def test_an_arm_imu_that_nothing_needs_may_go_silent(rig: Rig) -> None:
+    world = World(rig, motion=Motion(pitch=0.1), imus=("base", "boom_link"))
+    samples = world.samples(0.0, 2.0)
+    kept = [s for s in samples if not (getattr(s, "link", "") == "boom_link" and s.stamp > 1.0)]
+    assert pose_at(rig, feed(rig, kept), 2.05).validity is Validity.VALID
+
+
+def test_of_two_imus_on_a_part_the_newer_counts(rig: Rig) -> None:
+    old = World(rig, motion=Motion(pitch=0.2), imus=("base_link",)).samples(0.0, 0.2)
+    new = World(rig, motion=Motion(pitch=0.1), imus=("base",)).samples(0.2, 1.0)
+    assert pose_at(rig, feed(rig, old + new), 1.05).pitch == pytest.approx(0.1, abs=1e-6)

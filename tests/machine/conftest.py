@@ -18,12 +18,14 @@ TINY = """<robot name="tiny">
   </collision></link>
   <link name="house"><inertial><origin xyz="0.1 0 0.2"/><mass value="900"/>
     <inertia ixx="90" ixy="0" ixz="0" iyy="80" iyz="0" izz="70"/></inertial>
-    <collision><origin xyz="0 0 0.4"/><geometry><box size="1.5 1 0.6"/></geometry></collision></link>
+    <collision><origin xyz="0 0 0.4"/><geometry><box size="1.5 1 0.6"/></geometry></collision>
+  </link>
   <link name="boom"><collision><origin xyz="1 0 0" rpy="0 1.5707963 0"/>
     <geometry><cylinder radius="0.1" length="2"/></geometry></collision></link>
   <link name="stick"><collision><origin xyz="0.5 0 0"/><geometry><box size="1 0.2 0.2"/></geometry>
   </collision></link>
-  <link name="bucket"><collision><origin xyz="0.25 0 0"/><geometry><sphere radius="0.25"/></geometry>
+  <link name="bucket"><collision><origin xyz="0.25 0 0"/><geometry>
+  <sphere radius="0.25"/></geometry>
   </collision></link>
   <joint name="swing_joint" type="continuous"><parent link="base"/><child link="house"/>
     <origin xyz="0 0 0.5"/><axis xyz="0 0 1"/></joint>

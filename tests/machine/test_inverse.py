@@ -40,7 +40,8 @@ def test_reach_and_limits_are_told_apart(mini):
     far = inverse(mini, np.array([9.0, 0.0, 0.5]), 0.0)
     assert not far.reachable
     assert np.isfinite(far.q).all()
-    # The arm nearly stretched: the lengths allow it, the stick's upper limit of -25 degrees does not.
+    # The arm nearly stretched: its lengths allow it, the stick's upper limit of -25 degrees does
+    # not.
     stretched = inverse(mini, np.array([4.36, 0.0, 0.65]), 0.0)
     assert stretched.reachable
     assert not stretched.within_limits

@@ -16,7 +16,7 @@ from starlette.middleware.base import RequestResponseEndpoint
 
 from backend.fusion.pose import Validity
 from backend.pipeline.records import Snapshot
-from backend.shell.app.feed import Feed
+from backend.shell.app.feed import Feed, Frames
 from backend.shell.app.models import (
     HealthModel,
     MachineDescriptionModel,
@@ -24,7 +24,6 @@ from backend.shell.app.models import (
     SnapshotModel,
 )
 from backend.shell.app.wire import dumps
-from backend.shell.hub import Hub
 
 STATIC = Path(__file__).resolve().parents[3] / "static"
 
@@ -37,14 +36,13 @@ PAGE_POLICY = (
 
 @dataclass(frozen=True)
 class Sources:
-    """What the app reads. site: its document; snapshot: turns a snapshot into plain JSON.
+    """What the app reads. site: its document; frames: snapshots and images, encoded once.
 
     backend: live timings; on_message: what a page asks of the views (camera, own machine).
     """
 
-    hub: Hub
     site: dict[str, Any]
-    snapshot: Callable[[Snapshot], dict[str, Any]]
+    frames: Frames
     backend: Callable[[], dict[str, Any]]
     on_message: Callable[[dict[str, Any]], None]
 
@@ -60,16 +58,8 @@ def create_app(sources: Sources, viewer: APIRouter | None = None) -> FastAPI:
         openapi_url="/api/openapi.json",
         redoc_url=None,
     )
-    feed = Feed(
-        sources.hub,
-        lambda s: {
-            **sources.snapshot(s),
-            "backend": {**sources.backend(), "clients": feed.clients},
-        },
-        sources.site,
-        sources.on_message,
-    )
-    hub = sources.hub
+    feed = Feed(sources.frames, sources.site, sources.on_message)
+    hub = sources.frames.hub
 
     @app.middleware("http")
     async def headers(request: Request, call_next: RequestResponseEndpoint) -> Response:
@@ -93,8 +83,7 @@ def create_app(sources: Sources, viewer: APIRouter | None = None) -> FastAPI:
     async def health() -> Response:
         """Whether the backend and every machine are well, and what is wrong in words."""
         newest = hub.latest()
-        backend = {**sources.backend(), "clients": feed.clients}
-        return _json(_health(newest, backend, sources))
+        return _json(_health(newest, sources))
 
     @app.get("/api/site", responses={200: {"model": SiteModel}}, tags=["description"])
     async def site() -> Response:
@@ -116,8 +105,7 @@ def create_app(sources: Sources, viewer: APIRouter | None = None) -> FastAPI:
         newest = hub.latest()
         if newest is None:
             return JSONResponse({"detail": "no cycle has finished yet"}, status_code=503)
-        backend = {**sources.backend(), "clients": feed.clients}
-        return _json({**sources.snapshot(newest), "backend": backend})
+        return _json(sources.frames.document(newest))
 
     @app.websocket("/ws")
     async def socket(websocket: WebSocket) -> None:
@@ -143,7 +131,8 @@ def same_origin(websocket: WebSocket) -> bool:
     return origin is None or urlsplit(origin).netloc == websocket.headers.get("host")
 
 
-def _health(newest: Snapshot | None, backend: dict[str, Any], sources: Sources) -> dict[str, Any]:
+def _health(newest: Snapshot | None, sources: Sources) -> dict[str, Any]:
+    backend = sources.backend()
     machines = {} if newest is None else newest.machines
     status = [backend["failure"]] if backend["failure"] else []
     age = None if newest is None else time.monotonic() - newest.time

@@ -7,6 +7,7 @@ import contextlib
 import json
 import logging
 import time
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
@@ -22,11 +23,12 @@ log = logging.getLogger(__name__)
 
 SNAPSHOT_PERIOD = 0.03  # at least, between two snapshots to one page [s]
 MAX_MESSAGE = 4096  # from a page [bytes]
+IN_FLIGHT = 2  # snapshots sent to a page and not acknowledged by it
 
 
 @dataclass
 class Frames:
-    """Encoded frames, made once for all clients. `document` turns a snapshot into plain JSON."""
+    """Encoded frames, made once for all readers. `document` turns a snapshot into plain JSON."""
 
     hub: Hub
     document: Callable[[Snapshot], dict[str, Any]]
@@ -47,7 +49,7 @@ class Frames:
             known = self._images.get(key)
             if known is None or known[0] != image.state_time:
                 self._images[key] = (image.state_time, _image_frame(image))
-        return self._images
+        return dict(self._images)
 
 
 def _image_frame(image: PairImage) -> bytes:
@@ -77,18 +79,43 @@ def _image_frame(image: PairImage) -> bytes:
     return encode(header, frame_arrays(image))
 
 
+class Flow:
+    """How far a page is behind. A page that acknowledges gets no more than it can draw.
+
+    Without this, frames would pile up in the browser of a busy page, and it would show the past.
+    Programs that never acknowledge are sent everything.
+    """
+
+    def __init__(self) -> None:
+        self._acknowledges = False
+        self._in_flight: deque[int] = deque()
+
+    def sent(self, cycle: int) -> None:
+        self._in_flight.append(cycle)
+
+    def acknowledge(self, cycle: int) -> None:
+        self._acknowledges = True
+        while self._in_flight and self._in_flight[0] <= cycle:
+            self._in_flight.popleft()
+
+    @property
+    def open(self) -> bool:
+        if not self._acknowledges:
+            self._in_flight.clear()
+        return len(self._in_flight) < IN_FLIGHT
+
+
 class Feed:
     """Serves one accepted websocket until it closes."""
 
     def __init__(
         self,
-        hub: Hub,
-        document: Callable[[Snapshot], dict[str, Any]],
+        frames: Frames,
         site: dict[str, Any],
         on_message: Callable[[dict[str, Any]], None],
     ) -> None:
-        self._hub = hub
-        self._frames = Frames(hub, document)
+        self._hub = frames.hub
+        self._frames = frames
         self._site = encode({"type": "site", **site})
         self._on_message = on_message
         self.clients = 0
@@ -103,8 +130,9 @@ class Feed:
                 loop.call_soon_threadsafe(fresh.set)
 
         stop_listening = self._hub.listen(notify)
-        sender = asyncio.create_task(self._send(socket, fresh))
-        receiver = asyncio.create_task(self._receive(socket))
+        flow = Flow()
+        sender = asyncio.create_task(self._send(socket, fresh, flow))
+        receiver = asyncio.create_task(self._receive(socket, flow))
         try:
             done, _ = await asyncio.wait({sender, receiver}, return_when=asyncio.FIRST_COMPLETED)
             for task in done:
@@ -120,7 +148,7 @@ class Feed:
             await asyncio.gather(sender, receiver, return_exceptions=True)
             self.clients -= 1
 
-    async def _send(self, socket: WebSocket, fresh: asyncio.Event) -> None:
+    async def _send(self, socket: WebSocket, fresh: asyncio.Event, flow: Flow) -> None:
         await socket.send_bytes(self._site)
         sent_cycle = -1
         sent_images: dict[tuple[str, str], float] = {}
@@ -129,23 +157,32 @@ class Feed:
                 await asyncio.wait_for(fresh.wait(), timeout=1.0)
             fresh.clear()
             started = time.monotonic()
+            if not flow.open:
+                await asyncio.sleep(0.005)
+                fresh.set()
+                continue
             cycle, frame = self._frames.snapshot()
             if cycle != sent_cycle:
                 sent_cycle = cycle
+                flow.sent(cycle)
                 await socket.send_bytes(frame)
-            for key, (stamp, image) in list(self._frames.images().items()):
+            for key, (stamp, image) in self._frames.images().items():
                 if sent_images.get(key) != stamp:
                     sent_images[key] = stamp
                     await socket.send_bytes(image)
             # What arrives meanwhile waits for the next turn: the newest wins, nothing queues.
             await asyncio.sleep(max(0.0, SNAPSHOT_PERIOD - (time.monotonic() - started)))
 
-    async def _receive(self, socket: WebSocket) -> None:
+    async def _receive(self, socket: WebSocket, flow: Flow) -> None:
         while True:
             text = await socket.receive_text()
             if len(text) > MAX_MESSAGE:
                 continue
             with contextlib.suppress(ValueError):
                 message = json.loads(text)
-                if isinstance(message, dict):
+                if not isinstance(message, dict):
+                    continue
+                if message.get("type") == "ack" and isinstance(message.get("cycle"), int):
+                    flow.acknowledge(message["cycle"])
+                else:
                     self._on_message(message)

@@ -1,4 +1,4 @@
-"""The API's answers, described field by field with units: OpenAPI and JSON Schema come from here."""
+"""The API's answers, described field by field with units, for OpenAPI and JSON Schema."""
 
 from __future__ import annotations
 
@@ -158,7 +158,6 @@ class TimingModel(BaseModel):
 class BackendModel(BaseModel):
     step: TimingModel = Field(description="the fast loop: fusion, distances, concerns")
     images: TimingModel = Field(description="the image loop: all pairs")
-    clients: int = Field(description="pages connected")
     failure: str = Field(description="empty while both loops run")
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from backend.pipeline.records import Snapshot
@@ -14,9 +14,10 @@ PERIOD = 0.1  # [s]
 
 
 class Relay:
-    """Publishes the newest snapshot at 10 Hz, and alarms when they change.
+    """Publishes the newest snapshot and images at 10 Hz, and alarms when they change.
 
-    snapshot_text, alarms_text: JSON of a snapshot, and of its alarms.
+    snapshot_text, alarms_text: JSON of a snapshot, and of its alarms; images: (state time, frame)
+    of every image by (kind, pair).
     """
 
     def __init__(
@@ -25,8 +26,12 @@ class Relay:
         hub: Hub,
         snapshot_text: Callable[[Snapshot], str],
         alarms_text: Callable[[Snapshot], str],
+        images: Callable[[], Mapping[tuple[str, str], tuple[float, bytes]]],
     ) -> None:
         self._hub = hub
+        self._session = session
+        self._images = images
+        self._image_publishers: dict[str, Any] = {}
         self._texts = snapshot_text, alarms_text
         self._snapshots = publisher(session, "snapshot")
         self._alarms = publisher(session, "alarm")
@@ -42,9 +47,12 @@ class Relay:
             self._thread.join(timeout=1.0)
         self._snapshots.undeclare()
         self._alarms.undeclare()
+        for publisher_ in self._image_publishers.values():
+            publisher_.undeclare()
 
     def _run(self) -> None:
         cycle, said = -1, ""
+        sent: dict[tuple[str, str], float] = {}
         snapshot_text, alarms_text = self._texts
         while not self._stopping.wait(PERIOD):
             snapshot = self._hub.wait(cycle, PERIOD)
@@ -56,3 +64,12 @@ class Relay:
             if alarms != said:
                 said = alarms
                 self._alarms.put(alarms)
+            for (kind, pair), (stamp, frame) in self._images().items():
+                if sent.get((kind, pair)) != stamp:
+                    sent[(kind, pair)] = stamp
+                    self._publisher(kind).put(frame)
+
+    def _publisher(self, kind: str) -> Any:
+        if kind not in self._image_publishers:
+            self._image_publishers[kind] = publisher(self._session, "image", kind=kind)
+        return self._image_publishers[kind]

@@ -14,6 +14,7 @@ from backend.errors import InputError
 from backend.shell.link.topics import Topic, key, topic
 
 MODES = ("peer", "router")
+BURST = 16
 PROTOCOLS = ("tcp", "tls", "quic", "ws", "udp")
 _ENDPOINT = re.compile(rf"({'|'.join(PROTOCOLS)})/(\[[0-9a-fA-F:.]+\]|[^\s/:#?]+):(\d+)([?#]\S*)?")
 
@@ -68,6 +69,12 @@ def open_session(
         },
         "scouting/multicast/enabled": False,
         "scouting/delay": 0,  # nothing to wait for: partners are named
+        # Express messages take a batch each: room for a radio's burst (Sun's has 13) before any is
+        # dropped, when this computer is too busy to send at once. 16 is the most Zenoh allows.
+        "transport/link/tx/queue/size/real_time": BURST,
+        "transport/link/tx/queue/size/interactive_high": BURST,
+        "transport/link/tx/queue/size/interactive_low": BURST,
+        "transport/link/tx/queue/congestion_control/drop/wait_before_drop": 5_000,  # [us]
         "timestamping/enabled": False,  # the messages carry the machines' own stamps
     }
     config = zenoh.Config()

@@ -135,7 +135,29 @@ def motions(program: Program, lap: int) -> tuple[Motion, ...]:
 def _moves(
     program: Program, step: Step, q: Array, until: float, rng: np.random.Generator | None
 ) -> list[Motion]:
-    paths = [path_through(points, program.limits) for points in _waypoints(program, step, q, rng)]
+    """The motions of one step from q, rest to rest; a variation that does not fit is left out."""
+    if step.action == "go":
+        return _timed(program, step, until, [np.stack([q, program.postures[step.posture]])])
+    work = dig_waypoints if step.action == "dig" else dump_waypoints
+    spot = program.dig if step.action == "dig" else program.dump
+    if step.action == "dig" and rng is not None:
+        points = work(program.machine, _varied(spot, rng, program.variation), float(q[0]))
+        if points is not None:
+            try:
+                return _timed(program, step, until, [np.stack([q, points[0]]), points])
+            except InputError:
+                pass  # a little too far for the time there is
+    points = work(program.machine, spot, float(q[0]))
+    if points is None:
+        raise InputError(
+            f"{program.source}: {step.action} at reach {spot.reach:g} m and height "
+            f"{spot.height:g} m is out of the machine's reach."
+        )
+    return _timed(program, step, until, [np.stack([q, points[0]]), points])
+
+
+def _timed(program: Program, step: Step, until: float, waypoints: list[Array]) -> list[Motion]:
+    paths = [path_through(points, program.limits) for points in waypoints]
     needed = [shortest(path, program.limits) for path in paths]
     least = sum(needed)
     seconds = least if step.seconds is None else step.seconds
@@ -151,27 +173,6 @@ def _moves(
         made.append(Motion(t, duration, path))
         t += duration
     return made
-
-
-def _waypoints(
-    program: Program, step: Step, q: Array, rng: np.random.Generator | None
-) -> list[Array]:
-    """Waypoints of each motion of a step, rest to rest, from q."""
-    if step.action == "go":
-        return [np.stack([q, program.postures[step.posture]])]
-    work = dig_waypoints if step.action == "dig" else dump_waypoints
-    spot = program.dig if step.action == "dig" else program.dump
-    points = None
-    if step.action == "dig" and rng is not None:
-        points = work(program.machine, _varied(spot, rng, program.variation), float(q[0]))
-    if points is None:
-        points = work(program.machine, spot, float(q[0]))
-    if points is None:
-        raise InputError(
-            f"{program.source}: {step.action} at reach {spot.reach:g} m and height "
-            f"{spot.height:g} m is out of the machine's reach."
-        )
-    return [np.stack([q, points[0]]), points]
 
 
 def _varied(spot: Spot, rng: np.random.Generator, variation: float) -> Spot:

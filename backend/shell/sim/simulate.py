@@ -7,11 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from backend.machine.model import Machine
+from backend.shell.sim.agent import follow
 from backend.shell.sim.dynamics import Demand, Hydraulics, SimState, limits_of, step
 from backend.shell.sim.program import Program, reference
 from backend.spatial.types import Array
-
-GAIN = 3.0  # [1/s] how fast a joint returns to its reference
 
 
 @dataclass(frozen=True)
@@ -23,20 +22,15 @@ class Trajectory:
     qd: Array
 
 
-def follow(program: Program, hydraulics: Hydraulics, t: float, q: Array) -> Demand:
-    """Velocities that keep the joints q (n,) on the program's reference at t [s].
+def on_schedule(
+    program: Program, t: float, position: Array, yaw: float, pitch: float, roll: float
+) -> SimState:
+    """The machine where its program has it at t [s]; position: (3,) of the root, site frame [m].
 
-    The reference's acceleration makes up for the lag, so that the machine is not behind.
+    A machine that is switched on late appears there, so that it is in step with the others.
     """
-    q_ref, qd_ref, qdd_ref = reference(program, t)
-    joints = qd_ref + hydraulics.joint_lag * qdd_ref + GAIN * (q_ref - q)
-    return Demand(joints, np.zeros(2))
-
-
-def at_start(program: Program, position: Array, yaw: float, pitch: float, roll: float) -> SimState:
-    """The machine at rest in the program's start posture; position: (3,) site frame [m]."""
-    n = len(program.start)
-    return SimState(program.start, np.zeros(n), position, yaw, pitch, roll, np.zeros(2))
+    q, qd, _ = reference(program, t)
+    return SimState(q, qd, position, yaw, pitch, roll, np.zeros(2))
 
 
 def simulate(
@@ -49,12 +43,13 @@ def simulate(
     """The joints of a machine that runs its program from time 0, every dt [s]."""
     lags = hydraulics or Hydraulics()
     limits = limits_of(machine)
-    state = at_start(program, np.zeros(3), 0.0, 0.0, 0.0)
+    state = on_schedule(program, 0.0, np.zeros(3), 0.0, 0.0, 0.0)
     times: Array = np.arange(round(duration / dt) + 1) * np.float64(dt)
     q = np.empty((len(times), len(program.start)))
     qd = np.empty_like(q)
     q[0], qd[0] = state.q, state.qd
     for i, t in enumerate(times[:-1]):
-        state = step(state, follow(program, lags, float(t), state.q), limits, lags, dt)
+        joints = follow(reference(program, float(t)), state.q, lags)
+        state = step(state, Demand(joints, np.zeros(2)), limits, lags, dt)
         q[i + 1], qd[i + 1] = state.q, state.qd
     return Trajectory(times, q, qd)

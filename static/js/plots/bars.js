@@ -4,7 +4,7 @@ import { C, hatch, rgba, size } from "../theme.js";
 import { DEGREE_STEPS, deg, degrees, number, scale, ticks } from "../axis.js";
 import { clear, label, legend, message, segment, swatches } from "../pen.js";
 import { $ } from "../words.js";
-import { described, image, label as nameOf, machine, snapshotAge, state, sunMap, swing, swingAt } from "../state.js";
+import { described, image, imageStale, label as nameOf, machine, snapshotAge, state, sunMap, swing, swingAt } from "../state.js";
 import { surface } from "../surface.js";
 import { ageText } from "../head.js";
 
@@ -53,7 +53,7 @@ function paint(g, width, height, dpr) {
     return { state: { joints: {} }, age: Infinity, label: "Joints: no data yet" };
   }
   const t3 = size("t3"), t = size("tick");
-  const left = Math.round(4.2 * t3), right = width - Math.round(8.6 * t3);
+  const left = Math.round(4.2 * t3), right = width - Math.round(9.4 * t3);
   const foot = Math.round(1.3 * t);
   const pitch = (height - foot) / joints.length;
   const thick = Math.min(Math.round(0.9 * t3), pitch * 0.42);
@@ -65,15 +65,16 @@ function paint(g, width, height, dpr) {
     g.fillStyle = C.free;
     g.fillRect(left, y - thick / 2, right - left, thick);
     if (r.role === "swing") {
+      const colour = imageStale(image()) ? C.stale : C.partner;
       for (const [a, b] of blockedSwing()) {
         const x0 = Math.max(left, Math.min(map(a), map(b))), x1 = Math.min(right, Math.max(map(a), map(b)));
         if (x1 <= x0) continue;
-        g.fillStyle = rgba(C.partner, 0.35);
+        g.fillStyle = rgba(colour, 0.35);
         g.fillRect(x0, y - thick / 2, x1 - x0, thick);
-        g.fillStyle = hatch(g, C.partner, dpr);
+        g.fillStyle = hatch(g, colour, dpr);
         g.fillRect(x0, y - thick / 2, x1 - x0, thick);
         g.lineWidth = 2;
-        g.strokeStyle = C.partner;
+        g.strokeStyle = colour;
         g.strokeRect(x0 + 1, y - thick / 2 + 1, Math.max(0, x1 - x0 - 2), thick - 2);
       }
     }
@@ -101,7 +102,7 @@ function paint(g, width, height, dpr) {
     else label(g, "left +", width - 8, y, { align: "right", base: "middle", name: "t3" });
     return { ...r, y, map };
   });
-  legend(g, left, height - 0.65 * t, right - left, [
+  legend(g, left, height - 0.65 * t, width - left - 4, [
     [swatches.glyph((c, x, y) => segment(c, x, y - 6, x, y + 6, "#FFFFFF", 3)), "now"],
     [swatches.area(C.free, C.edge), "range"],
     [swatches.area(hatch(g, C.partner, dpr), C.partner), `${nameOf(state.partner)} at this reach (Sun)`],

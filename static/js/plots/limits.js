@@ -3,12 +3,12 @@
 import { C, size } from "../theme.js";
 import { clear, label, message, segment } from "../pen.js";
 import { $ } from "../words.js";
-import { described, label as nameOf, machine, severity, snapshotAge, state, sunMap } from "../state.js";
+import { described, label as nameOf, machine, severity, silence, snapshotAge, state, sunMap } from "../state.js";
 import { surface } from "../surface.js";
 import { ageText } from "../head.js";
 
 // Words for a lowering and a raising motion in Sun's sense (positive raises).
-const WORDS = { boom: ["down", "up"], stick: ["in", "out"], bucket: ["curl", "dump"], tilt: ["left", "right"], rotate: ["left", "right"], travel: ["back", "forward"] };
+const WORDS = { boom: ["down", "up"], stick: ["in", "out"], bucket: ["curl", "dump"], tilt: ["left", "right"], rotate: ["left", "right"], travel: ["back", "ahead"] };
 
 let cells = []; // for the pointer
 
@@ -25,8 +25,9 @@ export function advice(name) {
     }
     return best;
   };
-  const unknown = machine(name)?.validity !== "VALID";
-  const side = (pick, word) => ({ word, ...(unknown ? { allowed: 0, why: "own pose is not valid" } : smallest(pick)) });
+  // Without a verdict nothing is free.
+  const unknown = silence() > 1 ? "no data" : machine(name)?.validity !== "VALID" ? "own pose is not valid" : concerns.length ? "" : "no verdict received";
+  const side = (pick, word) => ({ word, ...(unknown ? { allowed: 0, why: unknown } : smallest(pick)) });
   const rows = joints.map((joint, i) => {
     const negative = (word) => side((c) => c.allowed?.[i]?.[0], word);
     const positive = (word) => side((c) => c.allowed?.[i]?.[1], word);
@@ -38,7 +39,7 @@ export function advice(name) {
     const raises = sunMap(name, joint.role).sign > 0;
     return { role: joint.role, sides: raises ? [negative(low), positive(high)] : [positive(low), negative(high)] };
   });
-  if (concerns.some((c) => c.travel)) rows.push({ role: "travel", sides: [side((c) => c.travel?.[0], "back"), side((c) => c.travel?.[1], "forward")] });
+  if (concerns.some((c) => c.travel)) rows.push({ role: "travel", sides: [side((c) => c.travel?.[0], "back"), side((c) => c.travel?.[1], "ahead")] });
   return rows;
 }
 
@@ -52,7 +53,8 @@ function paint(g, width, height) {
     return { state: {}, age: Infinity, label: "What limits: no data yet" };
   }
   const t3 = size("t3");
-  const first = Math.round(4.4 * t3);
+  const narrow = width < 400;
+  const first = Math.round((narrow ? 3.9 : 4.4) * t3);
   const column = (width - first - 8) / 2;
   const pitch = (height - 4) / rows.length;
   rows.forEach(({ role, sides }, i) => {
@@ -63,7 +65,7 @@ function paint(g, width, height) {
       const x = first + k * column;
       arrow(g, x + 4, y, Math.round(1.7 * t3), Math.min(pitch * 0.62, t3), k === 0 ? -1 : 1, one.allowed);
       const blocked = one.allowed <= 0.005, free = one.allowed >= 0.995;
-      const text = free ? one.word : blocked ? `${one.word} blocked` : `${one.word} ${Math.round(100 * one.allowed)} %`;
+      const text = free ? one.word : blocked && !narrow ? `${one.word} blocked` : `${one.word} ${Math.round(100 * one.allowed)} %`;
       label(g, text, x + 2.2 * t3 + 4, y, { base: "middle", colour: free ? C.second : C.text, weight: free ? 400 : 700, name: "t3" });
       cells.push({ x0: x, x1: x + column, y0: y - pitch / 2, y1: y + pitch / 2, role, ...one });
     });

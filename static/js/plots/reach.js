@@ -5,7 +5,7 @@ import { deg, degrees, metres, number, scale, ticks } from "../axis.js";
 import { clear, label, legend, message, segment, swatches } from "../pen.js";
 import { star } from "../glyphs.js";
 import { $, write } from "../words.js";
-import { image, imageAge, label as nameOf, machine, state, swingAt } from "../state.js";
+import { described, image, imageAge, imageStale, label as nameOf, machine, state, swingAt } from "../state.js";
 import { surface } from "../surface.js";
 import { ageText } from "../head.js";
 
@@ -44,14 +44,16 @@ function paint(g, width, height, dpr) {
   }
   const { header, arrays } = entry;
   const age = imageAge(entry);
+  const stale = imageStale(entry);
   const t = size("tick");
-  const top = own.max_reach + 0.5;
+  const longest = own.max_reach ?? described(state.own)?.max_reach ?? 0;
+  const top = longest + 0.5;
   box = { left: Math.round(1.9 * t), top: 4, right: width - 8, bottom: height - Math.round(2.9 * t) };
   mapX = azimuthAxis ? scale(0, TURN, box.left, box.right) : scale(Math.PI + SEAM, -Math.PI - SEAM, box.left, box.right);
   mapY = scale(0, top, box.bottom, box.top);
   const wide = box.right - box.left;
 
-  const limit = mapY(own.max_reach);
+  const limit = mapY(longest);
   g.fillStyle = C.outside;
   g.fillRect(box.left, box.top, wide, box.bottom - box.top);
   g.fillStyle = C.free;
@@ -76,21 +78,22 @@ function paint(g, width, height, dpr) {
 
   const now = header.current ?? {};
   const x = place(now.theta ?? NaN);
-  if (Number.isFinite(x) && Number.isFinite(now.d)) star(g, mapX(x), mapY(Math.min(now.d, top)), age > 1);
+  if (Number.isFinite(x) && Number.isFinite(now.d)) star(g, mapX(x), mapY(Math.min(now.d, top)), stale);
   label(g, "tip distance, m ↑", box.left + 5, box.top + 3, { base: "top", halo: true });
   label(g, azimuthAxis ? "azimuth from east →" : "← swing left", azimuthAxis ? box.right - 5 : box.left + 5, box.bottom - 4, { align: azimuthAxis ? "right" : "left", base: "bottom", halo: true });
   if (!azimuthAxis) label(g, "right →", box.right - 5, box.bottom - 4, { align: "right", base: "bottom", halo: true });
+  if (width < 300) label(g, `tip ${number(own.end_point?.[2], 1)} m high`, box.right - 4, box.top + 3, { align: "right", base: "top", halo: true });
   legend(g, 6, height - 0.65 * t, width - 8, [
     [swatches.area(hatch(g, C.partner, dpr), C.partner), `${nameOf(state.partner)} (Sun)`],
     [swatches.area(C.free, C.free), "free"],
     [swatches.area(C.outside, C.edge), "out of reach"],
   ]);
   if (!spans) label(g, `${nameOf(state.partner)} is out of reach`, box.left + wide / 2, (limit + box.bottom) / 2, { align: "center", halo: true });
-  if (age > 1) label(g, ageText(age), box.left + wide / 2, box.top + 2.4 * t, { align: "center", colour: C.text, weight: 700, name: "t3", halo: true });
+  if (stale) label(g, "STALE", box.left + wide / 2, box.bottom - 4, { align: "center", base: "bottom", colour: C.text, weight: 700, name: "t3", halo: true });
   return {
     state: {
-      own: state.own, partner: state.partner, axis: azimuthAxis ? "azimuth" : "swing", star: [deg(x), now.d].map((v) => Math.round(v * 1e3) / 1e3), hollow: age > 1,
-      collides: Boolean(now.collides), blocked: spans, max_reach: own.max_reach, state_time: header.state_time,
+      own: state.own, partner: state.partner, axis: azimuthAxis ? "azimuth" : "swing", star: [deg(x), now.d].map((v) => Math.round(v * 1e3) / 1e3), hollow: stale,
+      collides: Boolean(now.collides), blocked: spans, max_reach: longest, state_time: header.state_time,
     },
     age,
     label: `Reach of ${nameOf(state.own)} against ${nameOf(state.partner)} (Sun): swing ${degrees(x)}, tip at ${metres(now.d)}, ${now.collides ? "inside" : "outside"} the blocked area; ${ageText(age)}`,
@@ -145,7 +148,7 @@ export function reach() {
   const button = $("reach-mode");
   button.addEventListener("click", () => {
     azimuthAxis = !azimuthAxis;
-    write(button, azimuthAxis ? "0–360°" : "±180°");
+    write(button, azimuthAxis ? "0–360" : "±180");
     button.setAttribute("aria-pressed", String(azimuthAxis));
     s.dirty = true;
     s.last = -Infinity;

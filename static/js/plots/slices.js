@@ -6,7 +6,7 @@ import { clear, label, legend, message, segment, swatches } from "../pen.js";
 import { fillMesh, paintMask } from "../mesh.js";
 import { star } from "../glyphs.js";
 import { $ } from "../words.js";
-import { described, image, imageAge, label as nameOf, state, sunMap } from "../state.js";
+import { described, image, imageAge, imageStale, label as nameOf, state, sunMap } from "../state.js";
 import { surface } from "../surface.js";
 import { ageText } from "../head.js";
 
@@ -34,7 +34,7 @@ function slice(index) {
     const roomy = width >= 220; // the small layout has no ticks
     const t = size("tick");
     box = roomy
-      ? { left: Math.round(t * 2.7), top: 4, right: width - 8, bottom: height - Math.round(2.9 * t) }
+      ? { left: Math.round(t * 2.95), top: 4, right: width - 8, bottom: height - Math.round(2.9 * t) }
       : { left: 6, top: 2, right: width - 6, bottom: height - Math.round(1.5 * t) };
     const [x0, x1] = limits(state.own, across);
     const [y0, y1] = limits(state.own, up);
@@ -61,6 +61,7 @@ function slice(index) {
     }
     const { header, arrays } = entry;
     const age = imageAge(entry);
+    const stale = imageStale(entry);
     const { roomy, x0, x1, y0, y1 } = layout(width, height, dpr);
 
     g.fillStyle = C.outside;
@@ -86,16 +87,16 @@ function slice(index) {
     g.strokeRect(Math.round(fx) + 0.5, Math.round(fy) + 0.5, Math.round(fw) - 1, Math.round(fh) - 1);
 
     const x = header.current?.[across], y = header.current?.[up];
-    if (Number.isFinite(x) && Number.isFinite(y)) star(g, mapX(x), mapY(y), age > 1, roomy ? 11 : 9);
+    if (Number.isFinite(x) && Number.isFinite(y)) star(g, mapX(x), mapY(y), stale, roomy ? 11 : 9);
     label(g, `${up} ↑`, box.left + 5, box.top + 4, { base: "top", halo: true });
     label(g, `${across} →`, box.right - 5, box.bottom - 4, { align: "right", base: "bottom", halo: true });
     const fill = hatch(g, C.partner, dpr);
-    const entries = [[swatches.area(fill, C.partner), "projection (Sun)"]];
+    const entries = [[swatches.area(fill, C.partner), `${nameOf(state.own)}: projection (Sun)`]];
     legend(g, roomy ? 6 : 8, height - 0.65 * t, width - 8, entries);
     if (!cells) label(g, "no set: out of range", (box.left + box.right) / 2, (box.top + box.bottom) / 2 + 1.4 * t, { align: "center", halo: true });
-    if (age > 1) label(g, ageText(age), (box.left + box.right) / 2, box.top + 2.4 * t, { align: "center", colour: C.text, weight: 700, halo: true });
+    if (stale) label(g, "STALE", box.left + 5, box.bottom - 4, { base: "bottom", colour: C.text, weight: 700, halo: true });
     return {
-      state: { subject: title, kind: "projection", own: state.own, partner: state.partner, star: [round(x), round(y)], hollow: age > 1, cells, state_time: header.state_time },
+      state: { subject: title, kind: "projection", own: state.own, partner: state.partner, star: [round(x), round(y)], hollow: stale, cells, state_time: header.state_time },
       age,
       label: `${title} of ${nameOf(state.own)}, projection of Sun's set against ${nameOf(state.partner)}: ${cells} cells; now ${across} ${degrees(x)}, ${up} ${degrees(y)}; ${ageText(age)}`,
     };

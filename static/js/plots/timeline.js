@@ -25,6 +25,7 @@ function paint(g, width, height) {
     segment(g, x, y - thick / 2, x, y + thick / 2, C.grid);
   }
   label(g, "now", width - 6, y, { align: "right", base: "middle" });
+  for (const value of [-60, -40, -20]) label(g, `−${-value} s`, map(value) + 4, y + 0.5, { base: "middle", halo: true });
   const events = [...state.events].sort((a, b) => severity[a.level] - severity[b.level]);
   for (const e of events) {
     const x0 = map(Math.max(-SPAN, e.start - now)), x1 = map((e.end ?? now) - now);
@@ -42,8 +43,7 @@ function paint(g, width, height) {
     }
   }
   for (const e of events) levelMark(g, e.level, Math.max(map(-SPAN), map(Math.max(-SPAN, e.start - now))) + 1, y, Math.min(0.42 * height, 0.75 * t));
-  for (const value of [-60, -40, -20]) label(g, `−${-value} s`, map(value) + 4, y + 0.5, { base: "middle", halo: true });
-  if (!events.length) label(g, "no alarm in the last 60 s", (map(-SPAN) + map(0)) / 2, y + 0.5, { align: "center", base: "middle" });
+  if (!events.length && width > 560) label(g, "no alarm in the last 60 s", (map(-SPAN) + map(0)) / 2, y + 0.5, { align: "center", base: "middle" });
   return { state: { events: events.map((e) => [e.level, Math.round((now - e.start) * 10) / 10, e.end === null]) }, age: snapshotAge(), label: `Alarms of the last 60 s: ${events.length}` };
 }
 

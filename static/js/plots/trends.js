@@ -82,6 +82,7 @@ function unknown(g, { box, x }, now) {
     if (p.distance === null) from ??= p.time;
     else end(p.time);
   }
+  if (silence() > 1) from ??= state.history[state.history.length - 1]?.time ?? now;
   end(now);
 }
 
@@ -111,12 +112,12 @@ function paint(g, width, height) {
   const half = Math.round(width / 2);
   const { slow_below: slow, stop_below: stop } = s && state.site?.safety ? state.site.safety : { slow_below: 0.8, stop_below: 0.2 };
   const clearance = frame(g, 4, half - 4, height, FAR, "m", [0, 1, 2, 3, 4, 5], `clearance to ${nameOf(state.partner)}, m`);
-  const ages = frame(g, half + 4, width - 4, height, OLD, "s", [0, 0.1, 0.2, 0.3, 0.4, 0.5], "age of joint data, s");
+  const ages = frame(g, half + 4, width - 4, height, OLD, "s", [0, 0.1, 0.2, 0.3, 0.4, 0.5], "joint age, s");
   frames = [clearance, ages];
-  for (const [value, text] of [[slow, "slow"], [stop, "stop"]]) {
+  for (const [value, text, shift] of [[slow, "slow", 0], [stop, "stop", 4.6 * t]]) {
     const y = Math.round(clearance.y(value)) + 0.5;
     segment(g, clearance.box.left, y, clearance.box.right, y, C.edge, 1, [4, 4]);
-    label(g, `${text} ${number(value, 1)}`, clearance.box.left + 4, y - 2, { halo: true });
+    label(g, `${text} ${number(value, 1)}`, clearance.box.left + 4 + shift, y - 2, { halo: true });
   }
   curve(g, clearance, now, (p) => p.distance, C.text, 2);
   below(g, clearance, now, slow, C.slow);
@@ -127,7 +128,7 @@ function paint(g, width, height) {
   label(g, "stale 0.2", ages.box.left + 4, y - 2, { halo: true });
   const styles = [[state.own, C.text, 2, null], [state.partner, C.partnerLine, 2, [5, 3]]].filter(([name]) => name);
   for (const [name, colour, w, dash] of [...styles].reverse()) curve(g, ages, now, (p) => p.ages[name] ?? OLD, colour, w, dash);
-  legend(g, ages.box.left + 9.6 * t, 1 + 0.55 * t, ages.box.right - ages.box.left - 9 * t, styles.map(([name, colour, w, dash]) => [swatches.line(colour, dash, w), nameOf(name)]));
+  legend(g, ages.box.left + 6.6 * t, 1 + 0.55 * t, ages.box.right - ages.box.left - 6.6 * t, styles.map(([name, colour, w, dash]) => [swatches.line(colour, dash, w), nameOf(name)]));
   const last = state.history[state.history.length - 1];
   const age = snapshotAge();
   const known = state.history.map((p) => p.distance).filter((d) => d !== null);

@@ -1,0 +1,227 @@
+"""One simulated machine as a process on the wire, in real time."""
+
+from __future__ import annotations
+
+import math
+import threading
+import time
+from collections import deque
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from backend.machine.load import load_machine
+from backend.machine.model import Machine
+from backend.shell.link.codec import DecodeError, decode
+from backend.shell.link.encode import encode_clock, encode_status, encode_truth
+from backend.shell.link.messages import AgentStatus, Command, TrueState
+from backend.shell.link.session import open_session, publisher
+from backend.shell.link.topics import key, topic
+from backend.shell.sim.agent import Agent, act, fresh, hear
+from backend.shell.sim.dynamics import Hydraulics, SimState, limits_of, step
+from backend.shell.sim.program import Program, is_cut
+from backend.shell.sim.program_file import load_program
+from backend.shell.sim.radio import OnAir, Radio, receive, send
+from backend.shell.sim.sensors import Sensor, sensors
+from backend.shell.sim.simulate import on_schedule
+from backend.site.site import Site
+
+LONGEST_STEP = 0.005  # [s]
+CATCH_UP = 2.0  # [s] of a stalled host that are made up for; the rest is left out
+STATUS_PERIOD = 0.1  # [s]
+TRUTH_PERIOD = 0.02  # [s]
+
+
+def run(
+    site: Site,
+    name: str,
+    connect: tuple[str, ...],
+    start_at: float | None,
+    until: threading.Event,
+    skew: float = 0.0,
+) -> None:
+    """Simulates the machine `name` of the site until `until` is set.
+
+    connect: Zenoh endpoints, which may come and go. start_at: epoch [s] of the schedule's time 0,
+    the same for all machines; now when None. skew: of the machine's clock against this computer's
+    [s]. Raises InputError for a bad site, machine or endpoint.
+    """
+    entry = site.machine(name)
+    sidecar = None if entry.sidecar is None else site.folder / entry.sidecar
+    machine = load_machine(entry.model, sidecar, site.folder)
+    program = load_program(machine, site, name)
+    session = open_session(connect=connect)
+    try:
+        began = time.time() if start_at is None else start_at
+        run_machine(site, name, machine, program, session, began, until, skew)
+    finally:
+        session.close()
+
+
+@dataclass
+class _Wire:
+    """Publishers by topic name, the radio's messages, and commands waiting to be decoded."""
+
+    outlets: dict[str, Any]
+    radio: Radio
+    on_air: tuple[OnAir[tuple[str, bytes]], ...] = ()
+    inbox: deque[bytes] = field(default_factory=lambda: deque(maxlen=64))
+    cut: bool = False
+
+
+def run_machine(
+    site: Site,
+    name: str,
+    machine: Machine,
+    program: Program,
+    session: Any,
+    start_at: float,
+    until: threading.Event,
+    skew: float = 0.0,
+) -> None:
+    """The real-time loop on an open session; returns when `until` is set."""
+    # The computer's clock is read once: later corrections of it must not make time jump here.
+    epoch = time.time() - time.monotonic()
+    prefix = site.machine(name).prefix
+    rig = sensors(machine, site)
+    wire = _Wire(
+        {
+            **{s.topic: publisher(session, s.topic, prefix, **s.fields) for s in rig},
+            "status": publisher(session, "status", prefix),
+            "truth": publisher(session, "truth", prefix),
+        },
+        Radio(site.sim.radio_period, site.sim.latency),
+    )
+    clock_key = key("clock", prefix)
+
+    def on_clock(query: Any) -> None:
+        with query:
+            if not wire.cut:
+                now = time.monotonic() + epoch + skew
+                query.reply(clock_key, encode_clock(now), express=topic("clock").express)
+
+    def on_command(sample: Any) -> None:
+        if len(sample.payload) <= topic("cmd").max_bytes:
+            wire.inbox.append(sample.payload.to_bytes())
+
+    listening = [
+        session.declare_queryable(clock_key, on_clock),
+        session.declare_subscriber(key("cmd", prefix), on_command),
+    ]
+    try:
+        _loop(site, name, machine, program, rig, wire, epoch, start_at, until, skew)
+    finally:
+        for declared in (*listening, *wire.outlets.values()):
+            declared.undeclare()
+
+
+def _loop(
+    site: Site,
+    name: str,
+    machine: Machine,
+    program: Program,
+    rig: tuple[Sensor, ...],
+    wire: _Wire,
+    epoch: float,
+    start_at: float,
+    until: threading.Event,
+    skew: float,
+) -> None:
+    start = site.machine(name).start
+    position = site.frame.from_projected(
+        np.array(start.position if start else site.frame.to_projected(np.zeros(3)))
+    )
+    agent = fresh(program)
+    limits, hydraulics = limits_of(machine), Hydraulics()
+    rng = np.random.default_rng((program.seed, 1))
+    dt = min(LONGEST_STEP, site.sim.joint_period)
+    t = time.monotonic() + epoch  # machine's time without skew; advances by whole steps
+    due = [t] * len(rig)
+    status_due = truth_due = t
+    attitude = start.attitude if start else (0.0, 0.0, 0.0)
+    state = on_schedule(program, t - start_at, position, *attitude)
+    while not until.is_set():
+        now = time.monotonic() + epoch
+        if now - t > CATCH_UP:
+            t = now - CATCH_UP
+            due = [max(d, t) for d in due]
+            status_due, truth_due = max(status_due, t), max(truth_due, t)
+        wire.cut = is_cut(program, now - start_at)
+        agent = _commands(agent, machine, name, wire, now, start_at)
+        while t + dt <= now:
+            t += dt
+            agent, state, demand = act(agent, program, hydraulics, state, t - start_at)
+            state = step(state, demand, limits, hydraulics, dt)
+            if is_cut(program, t - start_at):
+                wire.on_air = ()
+                due = [max(d, t) for d in due]
+                continue
+            for i, sensor in enumerate(rig):
+                if t >= due[i] - 1e-6:
+                    message = sensor.topic, sensor.measure(state, t + skew, rng)
+                    wire.on_air = send(wire.on_air, t, message, wire.radio)
+                    due[i] = max(due[i] + sensor.period, t - sensor.period)
+            if t >= status_due - 1e-6:
+                status = encode_status(_status(agent, name, t + skew, t - start_at))
+                wire.on_air = send(wire.on_air, t, ("status", status), wire.radio)
+                status_due += STATUS_PERIOD
+            if t >= truth_due - 1e-6:
+                truth = _truth(machine, site, name, state, t + skew)
+                wire.outlets["truth"].put(encode_truth(truth))
+                truth_due += TRUTH_PERIOD
+        arrived, wire.on_air = receive(wire.on_air, now)
+        for outlet, payload in arrived:
+            wire.outlets[outlet].put(payload)
+        until.wait(max(0.0005, t + dt - (time.monotonic() + epoch)))
+
+
+def _commands(
+    agent: Agent, machine: Machine, name: str, wire: _Wire, now: float, start_at: float
+) -> Agent:
+    """The agent after all waiting commands; while the radio is cut they are lost."""
+    while wire.inbox:
+        payload = wire.inbox.popleft()
+        if wire.cut:
+            continue
+        try:
+            command = decode(name, topic("cmd").template.removeprefix("{machine}/"), payload, now)
+        except DecodeError:
+            continue
+        if isinstance(command, Command):
+            agent = hear(agent, command, machine, now - start_at)
+    return agent
+
+
+def _status(agent: Agent, name: str, stamp: float, now: float) -> AgentStatus:
+    last = agent.command
+    return AgentStatus(
+        machine=name,
+        stamp=stamp,
+        arrival=stamp,
+        mode=agent.mode.value,
+        holder=last.holder if last else "",
+        token=last.token if last else 0,
+        sequence=last.sequence if last else 0,
+        command_age=now - agent.heard_at if last else -1.0,
+        limit=1.0,
+        accepted=agent.accepted,
+        refused=agent.refused,
+    )
+
+
+def _truth(machine: Machine, site: Site, name: str, state: SimState, stamp: float) -> TrueState:
+    return TrueState(
+        machine=name,
+        stamp=stamp,
+        arrival=stamp,
+        names=tuple(joint.name for joint in machine.joints),
+        position=state.q,
+        velocity=state.qd,
+        base=site.frame.to_projected(state.position),
+        yaw=math.remainder(state.yaw, 2.0 * math.pi),
+        pitch=state.pitch,
+        roll=state.roll,
+        travel_left=float(state.travel[0]),
+        travel_right=float(state.travel[1]),
+    )
