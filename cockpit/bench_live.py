@@ -29,7 +29,7 @@ def live_rows(seconds: float) -> list[BenchRow]:
 
     endpoint = with_port("tcp/127.0.0.1:0")
     with _backend(endpoint) as (process, url):
-        session = open_session(connect=[endpoint])
+        session = open_session(connect=[endpoint], mode="router")
         arrivals: dict[str, list[float]] = {name: [] for name in MACHINES}
         subscribers = [
             session.declare_subscriber(

@@ -170,18 +170,53 @@ def make_runs(low: Array, high: Array, inner: Array, outer: Array, tolerance: fl
     zs, ins, outs, ends = [], [], [], [0]
     i = 0
     while i < n:
-        j, hull = i + 1, most[i : i + 2]
-        while j < n:
-            longer = _concave(z[i : j + 2], most[i : j + 2])
-            if (longer - most[i : j + 2]).max() > tolerance:
-                break
-            j, hull = j + 1, longer
-        zs.append(z[i : j + 1])
-        ins.append(least[i : j + 1])
-        outs.append(hull)
-        ends.append(ends[-1] + j + 1 - i)
-        i = j
+        # The error only grows with the length of the run: double it, then bisect.
+        fits, fails = i + 1, n + 1
+        step = 1
+        while fits < n and fails > fits + 1:
+            j = min(fits + step, n) if fails > n else (fits + fails) // 2
+            span = slice(i, j + 1)
+            if (_concave(z[span], most[span]) - most[span]).max() <= 0.5 * tolerance:
+                fits, step = j, 2 * step
+            else:
+                fails = j
+        span = slice(i, fits + 1)
+        run = _thinned(z[span], least[span], _concave(z[span], most[span]), 0.5 * tolerance)
+        zs.append(run[0])
+        ins.append(run[1])
+        outs.append(run[2])
+        ends.append(ends[-1] + len(run[0]))
+        i = fits
     return Revolved(*(np.concatenate(v) for v in (zs, ins, outs)), np.array(ends))
+
+
+def _thinned(z: Array, inner: Array, outer: Array, tolerance: float) -> tuple[Array, Array, Array]:
+    """Fewer heights for a run: radii moved outward and inward by at most `tolerance` [m]."""
+    keep = {0, len(z) - 1}
+    stack = [(0, len(z) - 1)]
+    while stack:
+        i, j = stack.pop()
+        if j < i + 2:
+            continue
+        s = (z[i : j + 1] - z[i]) / (z[j] - z[i])
+        error = np.maximum(
+            np.abs(outer[i : j + 1] - outer[i] - s * (outer[j] - outer[i])),
+            np.where(
+                inner[i : j + 1].max() > 0.0,
+                np.abs(inner[i : j + 1] - inner[i] - s * (inner[j] - inner[i])),
+                0.0,
+            ),
+        )
+        k = int(np.argmax(error))
+        if error[k] > tolerance:
+            keep.add(i + k)
+            stack += [(i, i + k), (i + k, j)]
+    chosen = np.array(sorted(keep))
+    low = np.interp(z, z[chosen], inner[chosen])
+    high = np.interp(z, z[chosen], outer[chosen])
+    lift = float(np.maximum(outer - high, 0.0).max())
+    drop = float(np.maximum(low - inner, 0.0).max())
+    return z[chosen], inner[chosen] - drop, outer[chosen] + lift
 
 
 def _concave(z: Array, r: Array) -> Array:

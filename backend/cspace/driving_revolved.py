@@ -10,34 +10,24 @@ of disks about the same vertices is a hole. Arcs are drawn as tangents outside, 
 from __future__ import annotations
 
 import numpy as np
-import shapely
 from numba import njit
 
 from backend.cspace.driving_profile import EDGES, Revolved, thickened
-from backend.cspace.minkowski import outermost, polygons, union
+from backend.cspace.minkowski import Pieces
 from backend.spatial.boxes import Boxes
 from backend.spatial.types import Array, IntArray
 
 
-def zone_of(solid: Revolved, bodies: Boxes, tolerance: float) -> shapely.Geometry:
-    """Positions (x, y) [m] of the axis for which the solid touches a body.
+def revolved_pieces(solid: Revolved, bodies: Boxes, tolerance: float) -> Pieces:
+    """Positions (x, y) [m] of the axis for which the solid touches a body, as pieces of a union.
 
-    bodies: boxes in a frame whose z axis is the solid's, heights counted alike. The polygon contains
-    the zone of the solid and exceeds it by at most `tolerance` [m].
+    bodies: boxes in a frame whose z axis is the solid's, heights counted alike. The pieces contain
+    the zone of the solid and exceed it by at most `tolerance` [m].
     """
-    if len(solid) == 0 or len(bodies) == 0:
-        return shapely.Polygon()
     corners = thickened(bodies).corners()
-    points, start, holes, hole_start = _zones(
-        corners, EDGES, solid.z, solid.inner, solid.outer, solid.start, tolerance
+    return Pieces(
+        *_zones(corners, EDGES, solid.z, solid.inner, solid.outer, solid.start, tolerance)
     )
-    hollow = np.diff(hole_start) > 0
-    keep = outermost(points, start, ~hollow)
-    made = polygons(points, start)
-    for k in np.flatnonzero(keep & hollow):
-        ring = holes[hole_start[k] : hole_start[k + 1]]
-        made[k] = shapely.Polygon(made[k].exterior, [ring])
-    return union([made[k] for k in np.flatnonzero(keep)])
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
@@ -216,12 +206,11 @@ def _zones(
     tolerance: float,
 ) -> tuple[Array, IntArray, Array, IntArray]:
     pairs = len(corners) * (len(start) - 1)
-    most = 1
     longest = 0
     for k in range(len(start) - 1):
         longest = max(longest, start[k + 1] - start[k])
     disks = np.empty((8 + 12 * (longest + 2), 4))
-    most = _sides(outer.max(), tolerance) + len(disks) + 8
+    most = _sides(outer.max() if len(outer) else 0.0, tolerance) + len(disks) + 8
     ring, hole = np.empty((2 * most, 2)), np.empty((2 * most, 2))
     points, holes = np.empty((4096, 2)), np.empty((4096, 2))
     ends, hole_ends = np.zeros(pairs + 1, np.int64), np.zeros(pairs + 1, np.int64)

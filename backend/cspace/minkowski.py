@@ -7,6 +7,8 @@ Driving moves in x and y only, so the slice of that solid at height 0 counts: a 
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import shapely
 from numba import njit
@@ -16,6 +18,9 @@ from backend.spatial.types import Array, BoolArray, IntArray
 
 MOST = 64
 """Room for the vertices of one slice: the difference of two boxes has at most 30 faces."""
+
+_SPECK = 1e-6
+"""A free place smaller than this counts as taken: rounding of the overlay can make such [m^2]."""
 
 
 def box_slices(a: Boxes, b: Boxes) -> tuple[Array, IntArray, IntArray]:
@@ -44,12 +49,70 @@ def union(pieces: list[shapely.Polygon]) -> shapely.Geometry:
     return shapely.union_all(pieces) if pieces else shapely.Polygon()
 
 
-def slice_union(a: Boxes, b: Boxes) -> shapely.Geometry:
-    """Union of `box_slices`: the translations for which anything of b touches anything of a."""
+@dataclass(frozen=True)
+class Pieces:
+    """Convex polygons, some with a convex hole, stored one after the other; see `box_slices`.
+
+    points: (k, 2) [m], start: (p + 1,); holes: (h, 2) [m], hole_start: (p + 1,), equal neighbours
+    where a piece has no hole.
+    """
+
+    points: Array
+    start: IntArray
+    holes: Array
+    hole_start: IntArray
+
+
+def slice_pieces(a: Boxes, b: Boxes) -> Pieces:
+    """`box_slices` as pieces without holes."""
     points, start, _ = box_slices(a, b)
-    keep = outermost(points, start, np.ones(len(start) - 1, dtype=np.bool_))
-    made = polygons(points, start)
-    return union([made[k] for k in np.flatnonzero(keep)])
+    return Pieces(points, start, np.zeros((0, 2)), np.zeros_like(start))
+
+
+def joined_pieces(parts: list[Pieces]) -> Pieces:
+    """All pieces of several lists."""
+
+    def ends(name: str) -> IntArray:
+        counts = [np.diff(getattr(p, name)) for p in parts]
+        return np.concatenate([[0], np.cumsum(np.concatenate(counts))]).astype(np.int64)
+
+    return Pieces(
+        np.concatenate([p.points for p in parts]),
+        ends("start"),
+        np.concatenate([p.holes for p in parts]),
+        ends("hole_start"),
+    )
+
+
+def cover(pieces: Pieces) -> shapely.Geometry:
+    """The union of all pieces.
+
+    Few outlines matter, those that lie in no other one. A free place within their union lies in
+    the holes of these few; what the pieces near it leave of it is cut out again.
+    """
+    if len(pieces.start) < 2:
+        return shapely.Polygon()
+    every = np.array(polygons(pieces.points, pieces.start), dtype=object)
+    outer = outermost(pieces.points, pieces.start, np.ones(len(every), dtype=np.bool_))
+    outline = union(list(every[outer]))
+    has = np.diff(pieces.hole_start) > 0
+    if not (outer & has).any():
+        return outline
+    filled = pieces.hole_start[np.append(True, has)]
+    hole = np.full(len(every), None, dtype=object)
+    hole[has] = polygons(pieces.holes, np.unique(filled))
+    free = union(list(hole[outer & has]))
+    # Largest first, solid before hollow: most free places are gone after a few.
+    for k in np.lexsort((-shapely.area(every), has)):
+        if free.is_empty:
+            return outline
+        if not shapely.intersects(every[k], free):
+            continue
+        free = shapely.difference(free, every[k]) if not has[k] else shapely.union(
+            shapely.difference(free, every[k]), shapely.intersection(free, hole[k])
+        )
+    parts = [g for g in shapely.get_parts(free) if g.geom_type == "Polygon" and g.area > _SPECK]
+    return shapely.difference(outline, union(parts)) if parts else outline
 
 
 def outermost(points: Array, start: IntArray, solid: BoolArray) -> BoolArray:

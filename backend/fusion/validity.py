@@ -99,11 +99,11 @@ def judge(
     since_step = now - streams.last_step
     if since_step < config.step_hold:
         reasons.append(f"machine's clock was stepped {max(0.0, since_step):.1f} s ago")
-    reasons += [f"no {WORDS[key]} received yet" for key, had in seen.items() if not had]
+    reasons += [f"has sent no {WORDS[key]} yet" for key, had in seen.items() if not had]
     if seen["joints"]:
         reasons += [f"{rig.machine.joints[k].role} angle is not published" for k in unknown]
     if fix is Fix.NONE and streams.position.received:
-        reasons.append("no GNSS fix")
+        reasons.append("has no GNSS fix")
     elif sigma_position > config.sigma_limit and status["position"].age <= limits["position"]:
         reasons.append(
             f"position is known to {sigma_position:.2f} m, limit {config.sigma_limit:.2f} m"

@@ -19,7 +19,7 @@ from backend.spatial.boxes import Boxes
 from backend.spatial.types import Array
 
 PAD = 7e-4  # [m] on every side: rounding, and the arc between two samples of a cylinder's sweep
-_SLACK = 0.03  # [m] the search aims this much below max_excess: grid, sampling, final growth
+_SLACK = 0.045  # [m] the search aims this much below max_excess: grid, sampling, final growth
 
 
 def fit_boxes(
@@ -82,7 +82,7 @@ def _points(triangles: Array) -> Array:
     """Points of the mesh for the search: as dense as 25,000 of them allow, 3 to 6 cm."""
     spacing = 0.03
     dense = points = thin(sample(triangles, spacing), spacing / 2.0)
-    while len(points) > 15_000 and spacing < 0.06:
+    while len(points) > 25_000 and spacing < 0.05:
         spacing *= 1.15
         points = thin(dense, spacing)
     return np.ascontiguousarray(points)

@@ -241,16 +241,21 @@ def search(
     tolerance: float,
     progress: Callable[[float], None],
     rounds: int = 120,
+    patience: int = 40,
 ) -> list[Piece]:
-    """At most `max_boxes` pieces that cover all points with the least cost found."""
+    """At most `max_boxes` pieces that cover all points with the least cost found.
+
+    Ends after `rounds` trials, or after `patience` of them in a row without a better set.
+    """
     s = Search(points, distance, tolerance)
     starts = [s.start(max_boxes, 2 * max_boxes, alone) for alone in (False, True)]
     pieces = min(starts, key=s.cost)
     least = s.cost(pieces)
     rng = np.random.default_rng(1)
+    last_gain = 0
     for r in range(rounds):
         progress(0.2 + 0.8 * r / rounds)
-        if least <= 2.0 * VOLUME * sum(p.volume for p in pieces):
+        if least <= 2.0 * VOLUME * sum(p.volume for p in pieces) or r - last_gain > patience:
             break
         trial = s.improved(pieces, rng, (1, 1, 2, 1, 1, 3)[r % 6])
         value = s.cost(trial)
@@ -258,7 +263,7 @@ def search(
             trial = s.turned(s.shrunk(trial)) if r % 4 == 3 else s.shrunk(trial)
             value = s.cost(trial)
         if value < least - 1e-12:
-            pieces, least = trial, value
+            pieces, least, last_gain = trial, value, r
     return s.turned(pieces)
 
 

@@ -2,7 +2,7 @@
 
 import { $, make, mark, partName, slowText, steady, write } from "./words.js";
 import { metres, seconds } from "./axis.js";
-import { alarms, label, link, machine, pair, severity, silence, snapshotAge, state } from "./state.js";
+import { alarms, atLeast, label, link, machine, pair, severity, silence, snapshotAge, state } from "./state.js";
 import { levelShape } from "./glyphs.js";
 import { acknowledge, acknowledged, sound } from "./sound.js";
 import { ageLevel, ageText } from "./head.js";
@@ -27,11 +27,14 @@ function compose() {
   }
   const p = pair(state.own, state.partner);
   const invalid = [state.own, state.partner].find((name) => name && machine(name)?.validity !== "VALID");
-  if (invalid || (p && p.distance === null)) {
+  if (invalid || (p && atLeast(p) === null)) {
     const why = p?.reason || machine(invalid)?.reasons?.[0] || "no complete pose";
     return { level: "UNKNOWN", line: `UNKNOWN · ${label(state.own)} ↔ ${label(state.partner)}`, detail: `Clearance unknown: ${why}.`, key: "unknown" };
   }
   if (!p) return { level: "CLEAR", line: `CLEAR · ${label(state.own)} · no other machine`, detail: "", key: "alone" };
+  if (p.distance === null) {
+    return { level: "CLEAR", line: `CLEAR · ${label(p.a)} ↔ ${label(p.b)} · over ${metres(calmDistance(p.at_least))}`, detail: "", key: "far" };
+  }
   const distance = calmDistance(p.distance);
   return { level: "CLEAR", line: `CLEAR · ${label(p.a)} ${partName(p.body_a)} ↔ ${label(p.b)} ${partName(p.body_b)} · ${metres(distance)}`, detail: "", key: `clear ${p.body_a} ${p.body_b}` };
 }

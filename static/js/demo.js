@@ -44,10 +44,13 @@ function point(id, text) {
   write(callout, text);
   callout.hidden = false;
   const target = $(id).getBoundingClientRect();
-  const above = target.top > 140;
+  // Above what it speaks of, but never over the alarm line.
+  const alarm = $("alarm").getBoundingClientRect();
+  const height = callout.offsetHeight + 10;
+  const above = target.top > 140 && (target.top - height > alarm.bottom || target.top <= alarm.bottom);
   mark(callout, "side", above ? "above" : "below");
   const x = Math.min(target.left + 12, innerWidth - callout.offsetWidth - 12);
-  const y = above ? target.top - callout.offsetHeight - 10 : target.bottom + 10;
+  const y = above ? target.top - height : Math.min(target.bottom + 10, innerHeight - height);
   callout.style.left = `${Math.round(x)}px`;
   callout.style.top = `${Math.round(y)}px`;
 }

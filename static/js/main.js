@@ -4,14 +4,14 @@ import { connect } from "./socket.js";
 import { readSizes } from "./theme.js";
 import { $ } from "./words.js";
 import { number } from "./axis.js";
-import { accept, choose, image, imageAge, imageStale, label, link, machine, names, silence, snapshotAge, state } from "./state.js";
+import { accept, choose, far, image, imageAge, imageStale, label, link, machine, names, silence, snapshotAge, state } from "./state.js";
 import { head } from "./head.js";
 import * as hover from "./hover.js";
 import * as alarm from "./alarm.js";
 import * as topbar from "./topbar.js";
 import * as demo from "./demo.js";
 import { startSound, toggleSound } from "./sound.js";
-import { startScene, updateCameras } from "./scene.js";
+import { page, startScene, updateCameras } from "./scene.js";
 import { plan } from "./plots/plan.js";
 import { reach } from "./plots/reach.js";
 import { slices } from "./plots/slices.js";
@@ -47,7 +47,7 @@ const quantiles = (list) => {
 function own(name) {
   if (!choose(name)) return;
   sessionStorage.setItem("own", name);
-  socket.send({ type: "own", machine: name });
+  socket.send({ type: "own", machine: name, page });
   for (const s of [...live, ...images]) Object.assign(s, { dirty: true, last: -Infinity });
 }
 
@@ -96,7 +96,7 @@ function onFrame(header, arrays) {
   accept(header, arrays);
   if (header.type === "site") {
     updateCameras(socket.send);
-    socket.send({ type: "own", machine: state.own });
+    socket.send({ type: "own", machine: state.own, page });
     for (const s of [...live, ...images]) s.dirty = true;
   } else if (header.type === "snapshot") {
     push(latency.arrival, Date.now() - 1000 * header.wall);
@@ -125,9 +125,9 @@ function tick() {
   heads.trends.who(state.partner ? `${subject} ↔ ${label(state.partner)}` : subject);
   for (const name of ["scene", "plan", "bars", "limits", "trends", "timeline"]) heads[name].age(age);
   const forced = Boolean(image()) && imageStale(image());
-  for (const name of ["reach", "slice-0", "slice-1", "slice-2"]) heads[name].age(old, forced);
+  for (const name of ["reach", "slice-0", "slice-1", "slice-2"]) heads[name].age(far() === null ? old : age, forced);
   // Ages and hollow stars must go on while nothing arrives.
-  if (old > 0.5 || forced) for (const s of images) s.dirty = true;
+  if (old > 0.5 || forced || far() !== null) for (const s of images) s.dirty = true;
   if (link() !== "ok" && state.snapshot) for (const s of live) s.dirty = true;
   hover.refresh();
 }
@@ -143,7 +143,7 @@ function frame(now) {
   if (drawn && waitingToDraw !== null) {
     push(latency.drawn, Date.now() - 1000 * waitingToDraw);
     waitingToDraw = null;
-    if ((image() || names().length < 2) && document.body.dataset.ready !== "1") document.body.dataset.ready = "1";
+    if ((image() || far() !== null || names().length < 2) && document.body.dataset.ready !== "1") document.body.dataset.ready = "1";
   }
 }
 

@@ -5,6 +5,9 @@ import { label, names, state } from "./state.js";
 
 let built = "";
 
+/** This window's own scene: its camera must not follow another operator's buttons. */
+export const page = Array.from(crypto.getRandomValues(new Uint8Array(12)), (byte) => byte.toString(16).padStart(2, "0")).join("");
+
 export function startScene(onKey) {
   const frame = $("scene");
   frame.addEventListener("load", () => {
@@ -14,7 +17,7 @@ export function startScene(onKey) {
       // another origin: the keys then work outside the scene only
     }
   });
-  frame.src = "/view/?hideViserLogo&darkMode";
+  frame.src = `/view/${page}/?hideViserLogo&darkMode`;
 }
 
 export function updateCameras(send) {
@@ -24,7 +27,7 @@ export function updateCameras(send) {
   const cameras = [["site", "Site"], ["plan", "Plan"], [`behind ${label(state.own)}`, "Behind"], ["follow", "Follow"]];
   $("cameras").replaceChildren(...cameras.map(([name, text]) => {
     const button = make("button", { type: "button", title: `Camera: ${name}`, text });
-    button.addEventListener("click", () => send({ type: "camera", name }));
+    button.addEventListener("click", () => send({ type: "camera", name, page }));
     return button;
   }));
 }

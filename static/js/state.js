@@ -34,6 +34,7 @@ export function accept(header, arrays) {
     if (state.snapshot && names().some((name) => !(name in state.snapshot.machines))) forget();
   } else if (header.type === "snapshot") {
     if (state.snapshot && header.cycle < state.snapshot.cycle && header.time < state.snapshot.time) forget(); // restarted
+    Object.values(header.machines).forEach(normalise);
     state.snapshot = header;
     state.arrival = now;
     state.serial += 1;
@@ -50,6 +51,14 @@ export function accept(header, arrays) {
     const serial = (state.images.get(header.key)?.serial ?? 0) + 1;
     state.images.set(header.key, { header, arrays, arrival: now, serial });
   }
+}
+
+/** Numbers that do not exist arrive as null: a point or posture with one of them does not exist. */
+function normalise(machine) {
+  for (const name of ["position", "position_projected", "swing_center", "end_point"]) {
+    if (!machine[name]?.every(Number.isFinite)) machine[name] = null;
+  }
+  if (!Object.values(machine.joints ?? { none: null }).every(Number.isFinite)) machine.joints = null;
 }
 
 function forget() {
@@ -79,6 +88,9 @@ export function pair(one, other) {
   return { ...found, a: found.b, b: found.a, body_a: found.body_b, body_b: found.body_a, points: found.points && [...found.points].reverse() };
 }
 
+/** The distance, or for machines far apart the bound below it; null when unknown. */
+export const atLeast = (p) => p?.distance ?? p?.at_least ?? null;
+
 function nearest() {
   const own = machine(state.own);
   if (!own) return null;
@@ -86,7 +98,7 @@ function nearest() {
   for (const name of names()) {
     if (name === state.own || !machine(name)) continue;
     const p = machine(name).position;
-    let distance = pair(state.own, name)?.distance ?? null;
+    let distance = atLeast(pair(state.own, name));
     if (distance === null) distance = own.position && p ? Math.hypot(own.position[0] - p[0], own.position[1] - p[1]) : Infinity;
     const compared = name === state.partner ? distance - SWITCH : distance;
     if (!best || compared < best.compared) best = { name, compared };
@@ -94,7 +106,16 @@ function nearest() {
   return best?.name ?? null;
 }
 
-export const image = () => state.images.get(`${state.own}<-${state.partner}`) ?? null;
+/** The bound of a pair too far apart to matter, else null. No image is computed of such a pair. */
+export function far() {
+  const p = pair(state.own, state.partner);
+  return p && p.distance === null ? p.at_least ?? null : null;
+}
+
+export const image = () => (far() === null ? state.images.get(`${state.own}<-${state.partner}`) ?? null : null);
+
+/** Why there is no image. */
+export const noImage = () => (far() === null ? "no image yet" : `${label(state.partner)} is over ${Math.floor(far())} m away`);
 
 /** Seconds since the last snapshot arrived. */
 export const silence = () => (performance.now() - state.arrival) / 1000;
@@ -138,7 +159,7 @@ export function dataAge(name) {
 
 /** Angles of Sun 2020, Fig. 2, from a joint's own value: sign * q + offset. */
 export function sunMap(name, role) {
-  const given = described(name)?.sun_map;
+  const given = described(name)?.sun;
   const index = ["boom", "stick", "bucket"].indexOf(role);
   if (given && index >= 0) return { sign: given.signs[index], offset: given.offsets[index] };
   const m = machine(name);
@@ -146,10 +167,15 @@ export function sunMap(name, role) {
   return { sign: 1, offset: Number.isFinite(offset) ? offset : 0 };
 }
 
+/** +1 when a machine's own swing angle grows to the left, as the words of its concerns tell. */
+export function swingSign(name) {
+  const words = state.snapshot?.concerns?.find((c) => c.machine === name)?.allowed?.swing?.words;
+  return words ? (words[1].endsWith("left") ? 1 : -1) : described(name)?.sun?.azimuth_sign ?? 1;
+}
+
 /** Swing, left positive, within ±π [rad]. */
 export function swing(name) {
-  const sign = described(name)?.sun_map?.azimuth_sign ?? 1;
-  return wrap(sign * (machine(name)?.joints?.swing ?? NaN));
+  return wrap(swingSign(name) * (machine(name)?.joints?.swing ?? NaN));
 }
 
 /** Swing, left positive, at which the arm has the azimuth theta. */
@@ -173,7 +199,7 @@ export const partnerLevel = (distance) => {
 function remember() {
   const s = state.snapshot;
   const p = pair(state.own, state.partner);
-  const distance = p?.distance ?? null;
+  const distance = atLeast(p);
   for (const { distance: d } of s.pairs) if (d !== null && d < state.closest) state.closest = d;
   const contact = s.pairs.some((q) => q.distance !== null && q.distance <= 0);
   if (contact && !touching) state.contacts += 1;

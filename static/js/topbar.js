@@ -45,7 +45,7 @@ function build() {
 
 function fixWord(fix) {
   if (fix === null || fix === undefined) return "no fix";
-  return FIX[String(fix).toUpperCase()] ?? String(fix).replace(/_/g, " ").toLowerCase();
+  return FIX[String(fix).toUpperCase()] ?? String(fix).replace(/_/g, " ");
 }
 
 export function update() {
@@ -66,9 +66,10 @@ export function update() {
   const mode = s.mode ?? state.site?.mode;
   write($("mode"), mode);
   mark($("mode"), "mode", mode);
-  const ms = s.backend?.cycle_ms;
-  cycle(ms ? `cycle ${number(ms.p95, 1)} ms` : "cycle –");
-  rate(s.backend?.rate_hz ? `p95 · ${number(s.backend.rate_hz, 0)} Hz` : "");
+  const ms = s.backend?.cycle_ms ?? s.backend?.step;
+  const hz = s.backend?.rate_hz ?? s.backend?.step?.rate;
+  cycle(Number.isFinite(ms?.p95) ? `cycle ${number(ms.p95, ms.p95 < 100 ? 1 : 0)} ms` : "cycle –");
+  rate(Number.isFinite(hz) ? `p95 · ${number(hz, 0)} Hz` : "");
   build();
   for (const [name, parts] of machines) {
     const m = machine(name);

@@ -116,15 +116,15 @@ def test_true_north_headings_are_turned_to_the_grid(varied: Callable[..., Rig]) 
 def test_unknown_until_every_stream_was_seen(rig: Rig) -> None:
     streams = Streams()
     assert pose_at(rig, streams, 0.0).reasons == (
-        "no joint angles received yet",
-        "no position received yet",
-        "no heading received yet",
+        "has sent no joint angles yet",
+        "has sent no position yet",
+        "has sent no heading yet",
     )
     world = World(rig)
     streams = feed(rig, [world.joint(0.0), world.gnss(0.0)])
     pose = pose_at(rig, streams, 0.07)
     assert pose.validity is Validity.UNKNOWN
-    assert pose.reasons == ("no heading received yet",)
+    assert pose.reasons == ("has sent no heading yet",)
     assert pose_at(rig, feed(rig, [world.heading(0.0)], streams), 0.07).validity is Validity.VALID
 
 
@@ -248,7 +248,7 @@ def test_losing_the_fix_is_known_at_once_and_the_place_stays_for_drawing(rig: Ri
     assert (pose.validity, pose.fix, pose.reasons) == (
         Validity.UNKNOWN,
         Fix.NONE,
-        ("no GNSS fix",),
+        ("has no GNSS fix",),
     )
     np.testing.assert_allclose(pose.position, world.motion.position, atol=1e-5)
     again = feed(rig, [world.gnss(1.05)], streams)

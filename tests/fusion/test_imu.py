@@ -62,7 +62,7 @@ def test_a_joint_without_sensor_is_named(rig: Rig) -> None:
     world = World(rig, imus=("base", "upper_link", "boom_link"), joints=False)
     pose = pose_at(rig, feed(rig, world.samples(0.0, 0.5)), 0.55)
     assert pose.validity is Validity.UNKNOWN
-    assert "no joint angles received yet" in pose.reasons
+    assert "has sent no joint angles yet" in pose.reasons
 
 
 def test_swing_alone_from_a_sensor_and_the_arm_from_imus(rig: Rig) -> None:

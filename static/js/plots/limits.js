@@ -3,7 +3,7 @@
 import { C, size } from "../theme.js";
 import { clear, label, message, segment } from "../pen.js";
 import { $ } from "../words.js";
-import { described, label as nameOf, machine, severity, silence, snapshotAge, state, sunMap } from "../state.js";
+import { described, label as nameOf, machine, severity, silence, snapshotAge, state, sunMap, swingSign } from "../state.js";
 import { surface } from "../surface.js";
 import { ageText } from "../head.js";
 
@@ -29,17 +29,17 @@ export function advice(name) {
   const unknown = silence() > 1 ? "no data" : machine(name)?.validity !== "VALID" ? "own pose is not valid" : concerns.length ? "" : "no verdict received";
   const side = (pick, word) => ({ word, ...(unknown ? { allowed: 0, why: unknown } : smallest(pick)) });
   const rows = joints.map((joint, i) => {
-    const negative = (word) => side((c) => c.allowed?.[i]?.[0], word);
-    const positive = (word) => side((c) => c.allowed?.[i]?.[1], word);
+    const share = (c, k) => c.allowed?.[joint.role]?.[k ? "positive" : "negative"] ?? c.allowed?.[i]?.[k];
+    const negative = (word) => side((c) => share(c, 0), word);
+    const positive = (word) => side((c) => share(c, 1), word);
     if (joint.role === "swing") {
-      const left = described(name).sun_map?.azimuth_sign ?? 1;
-      return { role: "swing", sides: left > 0 ? [positive("left"), negative("right")] : [negative("left"), positive("right")] };
+      return { role: "swing", sides: swingSign(name) > 0 ? [positive("left"), negative("right")] : [negative("left"), positive("right")] };
     }
     const [low, high] = WORDS[joint.role] ?? ["−", "+"];
     const raises = sunMap(name, joint.role).sign > 0;
     return { role: joint.role, sides: raises ? [negative(low), positive(high)] : [positive(low), negative(high)] };
   });
-  if (concerns.some((c) => c.travel)) rows.push({ role: "travel", sides: [side((c) => c.travel?.[0], "back"), side((c) => c.travel?.[1], "ahead")] });
+  if (concerns.some((c) => c.travel)) rows.push({ role: "travel", sides: [side((c) => c.travel?.backward ?? c.travel?.[0], "back"), side((c) => c.travel?.forward ?? c.travel?.[1], "ahead")] });
   return rows;
 }
 

@@ -5,7 +5,7 @@ import { grouped, metres, ticks } from "../axis.js";
 import { label, segment } from "../pen.js";
 import { cross } from "../glyphs.js";
 import { edgeDistance, inside } from "../geometry.js";
-import { label as nameOf, machine, pair, partnerLevel, silence, state } from "../state.js";
+import { atLeast, label as nameOf, machine, pair, partnerLevel, silence, state } from "../state.js";
 
 /** Of the present drawing: at([E, N]) -> [x, y] and back(x, y) -> [E, N]; px per metre; box; view. */
 export const chart = { at: null, back: null, px: 1, box: null, view: null };
@@ -188,6 +188,7 @@ export function exitArrow(g, own, zone) {
 export function nearestLine(g) {
   const p = pair(state.own, state.partner);
   if (!p) return null;
+  if (p.distance === null && atLeast(p) !== null && silence() <= 1) return null; // far apart: no points to join
   const distance = silence() > 1 ? null : p.distance;
   if (!p.points || distance === null) {
     const a = machine(state.own)?.swing_center, b = machine(state.partner)?.swing_center;

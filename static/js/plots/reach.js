@@ -5,7 +5,7 @@ import { deg, degrees, metres, number, scale, ticks } from "../axis.js";
 import { clear, label, legend, message, segment, swatches } from "../pen.js";
 import { star } from "../glyphs.js";
 import { $, write } from "../words.js";
-import { described, image, imageAge, imageStale, label as nameOf, machine, state, swingAt } from "../state.js";
+import { described, image, imageAge, imageStale, label as nameOf, machine, noImage, state, swingAt } from "../state.js";
 import { surface } from "../surface.js";
 import { ageText } from "../head.js";
 
@@ -39,7 +39,7 @@ function paint(g, width, height, dpr) {
   const entry = image();
   const own = machine(state.own);
   if (!entry || !own) {
-    message(g, width, height, "no image yet");
+    message(g, width, height, noImage());
     return { state: { star: null, blocked: 0 }, age: Infinity, label: "Reach: no image yet" };
   }
   const { header, arrays } = entry;
@@ -76,6 +76,7 @@ function paint(g, width, height, dpr) {
   const spans = blocked(g, arrays, limit, dpr);
   segment(g, box.left, Math.round(limit) + 0.5, box.right, Math.round(limit) + 0.5, C.edge);
 
+  if (!spans) label(g, `${nameOf(state.partner)} is out of reach`, box.left + wide / 2, (limit + box.bottom) / 2, { align: "center", halo: true });
   const now = header.current ?? {};
   const x = place(now.theta ?? NaN);
   if (Number.isFinite(x) && Number.isFinite(now.d)) star(g, mapX(x), mapY(Math.min(now.d, top)), stale);
@@ -88,7 +89,6 @@ function paint(g, width, height, dpr) {
     [swatches.area(C.free, C.free), "free"],
     [swatches.area(C.outside, C.edge), "out of reach"],
   ]);
-  if (!spans) label(g, `${nameOf(state.partner)} is out of reach`, box.left + wide / 2, (limit + box.bottom) / 2, { align: "center", halo: true });
   if (stale) label(g, "STALE", box.left + wide / 2, box.bottom - 4, { align: "center", base: "bottom", colour: C.text, weight: 700, name: "t3", halo: true });
   return {
     state: {

@@ -6,7 +6,7 @@ import { clear, label, legend, message, segment, swatches } from "../pen.js";
 import { fillMesh, paintMask } from "../mesh.js";
 import { star } from "../glyphs.js";
 import { $ } from "../words.js";
-import { described, image, imageAge, imageStale, label as nameOf, state, sunMap } from "../state.js";
+import { described, image, imageAge, imageStale, label as nameOf, noImage, state, sunMap } from "../state.js";
 import { surface } from "../surface.js";
 import { ageText } from "../head.js";
 
@@ -56,7 +56,7 @@ function slice(index) {
     clear(g, width, height);
     const entry = image();
     if (!entry) {
-      message(g, width, height, "no image yet");
+      message(g, width, height, noImage());
       return { state: { cells: 0, star: null }, age: Infinity, label: `${title}: no image yet` };
     }
     const { header, arrays } = entry;
@@ -86,6 +86,7 @@ function slice(index) {
     g.strokeStyle = C.edge;
     g.strokeRect(Math.round(fx) + 0.5, Math.round(fy) + 0.5, Math.round(fw) - 1, Math.round(fh) - 1);
 
+    if (!cells) label(g, `${nameOf(state.partner)} is out of reach`, (box.left + box.right) / 2, (box.top + box.bottom) / 2 + 1.4 * t, { align: "center", halo: true });
     const x = header.current?.[across], y = header.current?.[up];
     if (Number.isFinite(x) && Number.isFinite(y)) star(g, mapX(x), mapY(y), stale, roomy ? 11 : 9);
     label(g, `${up} ↑`, box.left + 5, box.top + 4, { base: "top", halo: true });
@@ -93,7 +94,6 @@ function slice(index) {
     const fill = hatch(g, C.partner, dpr);
     const entries = [[swatches.area(fill, C.partner), `${nameOf(state.own)}: projection (Sun)`]];
     legend(g, roomy ? 6 : 8, height - 0.65 * t, width - 8, entries);
-    if (!cells) label(g, "no set: out of range", (box.left + box.right) / 2, (box.top + box.bottom) / 2 + 1.4 * t, { align: "center", halo: true });
     if (stale) label(g, "STALE", box.left + 5, box.bottom - 4, { base: "bottom", colour: C.text, weight: 700, halo: true });
     return {
       state: { subject: title, kind: "projection", own: state.own, partner: state.partner, star: [round(x), round(y)], hollow: stale, cells, state_time: header.state_time },
