@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import math
+import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -60,8 +61,8 @@ def load_models(site: Site) -> dict[str, Machine]:
             if key not in loaded:
                 task = bar.add_task(f"{machine.name}: {machine.model}", total=1.0)
 
-                def progress(done: float, what: str = "", task: Any = task) -> None:
-                    bar.update(task, completed=done, description=what or None)
+                def progress(text: str, share: float, task: Any = task) -> None:
+                    bar.update(task, completed=share, description=text)
 
                 sidecar = None if machine.sidecar is None else site.folder / machine.sidecar
                 loaded[key] = load_machine(machine.model, sidecar, site.folder, progress)
@@ -110,6 +111,8 @@ class Station:
         demo_began: Callable[[], float] | None,
         listener: Any,
     ) -> None:
+        # The fast loop must not wait 5 ms, the default, for another thread to hand over.
+        sys.setswitchinterval(0.001)
         models = load_models(site)
         self.config = make_config(site, models, options.own, options.mode)
         self._demo_began = demo_began

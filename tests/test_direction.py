@@ -43,6 +43,7 @@ LIBRARIES = {
     "zenoh": "backend.shell.link",
     "rosbags": "backend.shell.link",
     "fastapi": "backend.shell.app",
+    "fastapi_offline": "backend.shell.app",
     "starlette": "backend.shell.app",
     "uvicorn": "backend.shell.app",
     "viser": "cockpit.views",

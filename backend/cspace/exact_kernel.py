@@ -58,7 +58,6 @@ class Cells(NamedTuple):
 def _slices(
     body: Profiles,
     boxes: tuple[Array, Array, Array],
-    T: Array,
     pairs: BoolArray,
     cells: Cells,
     pivot: Array,
@@ -71,14 +70,9 @@ def _slices(
     pad = ROUNDING * kind
     wide = max(abs(body.slabs.min()), abs(body.slabs.max())) + abs(pad)
     wanted = np.zeros((slabs, m), np.bool_)
-    placed = np.empty((m, 3))
     for j in range(m):
-        for i in range(3):
-            placed[j, i] = T[i, 3]
-            for k in range(3):
-                placed[j, i] += T[i, k] * centers[j, k]
         size = math.sqrt(halves[j, 0] ** 2 + halves[j, 1] ** 2 + halves[j, 2] ** 2) + 1e-6
-        x, t, z = placed[j]
+        x, t, z = centers[j, 0], centers[j, 1], centers[j, 2]
         beside = abs(t) * math.cos(spread) - abs(x) * math.sin(spread) - size
         # The swing moves a point on a circle about z: its distance from the pivot is at least
         # that of the nearest point of the circle.
@@ -108,13 +102,10 @@ def _slices(
                 made = True
                 for v in range(8):
                     for i in range(3):
-                        corners[v, i] = placed[j, i]
+                        corners[v, i] = centers[j, i]
                         for a in range(3):
-                            sign = halves[j, a] if (v >> a) & 1 else -halves[j, a]
-                            axis = 0.0
-                            for c in range(3):
-                                axis += T[i, c] * rotations[j, c, a]
-                            corners[v, i] += sign * axis
+                            half = halves[j, a] if (v >> a) & 1 else -halves[j, a]
+                            corners[v, i] += half * rotations[j, i, a]
             low, high = body.slabs[s, 0] - pad, body.slabs[s, 1] + pad
             if kind == INNER and spread > 0.0:
                 n = inner_slice(corners, low, high, spread, points, work, xs[k], zs[k])
@@ -161,7 +152,6 @@ def _pairs_of(body: Profiles, polygons: Polygons, pairs: BoolArray, group: int) 
     """(k, 2) bodies of the group and the polygons in their slabs that they must not touch."""
     out = np.empty((len(body.group) * len(polygons.slab), 2), np.int64)
     k = 0
-    # Outer loop over bodies: those whose prism is exact are listed first by the caller's order.
     for b in range(len(body.group)):
         if body.group[b] != group or body.count[b] == 0:
             continue
@@ -180,10 +170,10 @@ def _near(
     out = np.empty_like(chosen)
     k = 0
     for i in range(len(chosen)):
-        b, p = chosen[i]
+        b, p = chosen[i, 0], chosen[i, 1]
         within = body.reach[b] + extra
         if rectangle_distance(polygons.low[p], polygons.high[p], px, pz) <= within * within:
-            out[k] = chosen[i]
+            out[k, 0], out[k, 1] = b, p
             k += 1
     return out[:k]
 
@@ -196,7 +186,6 @@ def _row(
     body: Profiles,
     polygons: Polygons,
     boxes: tuple[Array, Array, Array],
-    T: Array,
     px: float,
     pz: float,
     row: Row,
@@ -210,7 +199,7 @@ def _row(
     """Set the bits of `out` that the chosen pairs block. scratch: (3, words)."""
     askew = False
     for i in range(len(chosen)):
-        b, p = chosen[i]
+        b, p = chosen[i, 0], chosen[i, 1]
         if kind == EXACT and chain.askew[b]:
             askew = True
             continue
@@ -229,7 +218,7 @@ def _row(
     if not askew:
         return
     for i in range(len(chosen)):
-        b, p = chosen[i]
+        b, p = chosen[i, 0], chosen[i, 1]
         if not chain.askew[b]:
             continue
         within = body.reach[b]
@@ -244,7 +233,7 @@ def _row(
                 if not (rest >> np.uint64(bit)) & np.uint64(1):
                     continue
                 angle = row.start + (64 * w + bit) * row.step
-                if _box_touches(chain, group, b, boxes, polygons.obstacle[p], T, px, pz, angle):
+                if _box_touches(chain, group, b, boxes, polygons.obstacle[p], px, pz, angle):
                     out[w] |= np.uint64(1) << np.uint64(bit)
 
 
@@ -255,7 +244,6 @@ def _box_touches(
     b: int,
     boxes: tuple[Array, Array, Array],
     j: int,
-    T: Array,
     px: float,
     pz: float,
     angle: float,
@@ -274,9 +262,22 @@ def _box_touches(
         R[0, k] = c * chain.rotations[b, 0, k] - s * chain.rotations[b, 2, k]
         R[1, k] = chain.rotations[b, 1, k]
         R[2, k] = s * chain.rotations[b, 0, k] + c * chain.rotations[b, 2, k]
-    placed = T[:, :3] @ boxes[0][j] + T[:, 3]
-    turned = T[:, :3] @ boxes[1][j]
-    return bool(gap(center, R, chain.halves[b], placed, turned, boxes[2][j], 0.0) <= 0.0)
+    return bool(gap(center, R, chain.halves[b], boxes[0][j], boxes[1][j], boxes[2][j], 0.0) <= 0.0)
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _placed(boxes: tuple[Array, Array, Array], T: Array) -> tuple[Array, Array, Array]:
+    """The obstacles in the frame `arm`. T: (3, 4)."""
+    m = len(boxes[0])
+    centers, rotations = np.empty((m, 3)), np.zeros((m, 3, 3))
+    for j in range(m):
+        for i in range(3):
+            centers[j, i] = T[i, 3]
+            for k in range(3):
+                centers[j, i] += T[i, k] * boxes[0][j, k]
+                for a in range(3):
+                    rotations[j, i, a] += T[i, k] * boxes[1][j, k, a]
+    return centers, rotations, boxes[2]
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
@@ -293,7 +294,7 @@ def _full(n: int) -> AnyArray:
 def _swing_block(
     chain: Chain,
     body: Profiles,
-    boxes: tuple[Array, Array, Array],
+    obstacles: tuple[Array, Array, Array],
     pairs: BoolArray,
     T: Array,
     cells: Cells,
@@ -307,7 +308,8 @@ def _swing_block(
     for b in range(len(body.group)):
         far[body.group[b]] = max(far[body.group[b]], body.reach[b])
     reach = max(far[0], l1 + far[1], l1 + l2 + far[2])
-    polygons = _slices(body, boxes, T, pairs, cells, chain.pivot, reach)
+    boxes = _placed(obstacles, T)
+    polygons = _slices(body, boxes, pairs, cells, chain.pivot, reach)
     if len(polygons.slab) == 0:
         return
     boom_pairs = _pairs_of(body, polygons, pairs, 0)
@@ -325,7 +327,7 @@ def _swing_block(
     blocked1, blocked2 = np.zeros(len(full1), np.uint64), np.zeros(len(full2), np.uint64)
     px, pz = chain.pivot[0], chain.pivot[1]
     _row(
-        boom_pairs, chain, 0, body, polygons, boxes, T, px, pz, cells.boom,
+        boom_pairs, chain, 0, body, polygons, boxes, px, pz, cells.boom,
         sign * pad, sign * (turn_boom + pad), kind, full1, scratch1, blocked1,
     )  # fmt: skip
     for i in range(cells.boom.n):
@@ -341,10 +343,10 @@ def _swing_block(
         row2 = Row(cells.stick.start + angle1, cells.stick.step, cells.stick.n)
         blocked2[:] = 0
         _row(
-            stick_pairs, chain, 1, body, polygons, boxes, T, qx, qz, row2,
+            stick_pairs, chain, 1, body, polygons, boxes, qx, qz, row2,
             sign * margin, sign * (turn_stick + pad), kind, full2, scratch2, blocked2,
         )  # fmt: skip
-        most = l2 + (l1 + l2) * turn_boom + l2 * cells.halves[2] + pad
+        most = l2 + (l1 + 2.0 * l2) * turn_boom + l2 * cells.halves[2] + pad
         near = _near(bucket_pairs, body, polygons, qx, qz, most)
         for k in range(cells.stick.n):
             if (blocked2[k // 64] >> np.uint64(k % 64)) & np.uint64(1):
@@ -361,7 +363,7 @@ def _swing_block(
             margin = lever * turn_boom + l2 * cells.halves[2] + pad
             row3 = Row(cells.bucket.start + angle2, cells.bucket.step, cells.bucket.n)
             _row(
-                near, chain, 2, body, polygons, boxes, T, rx, rz, row3,
+                near, chain, 2, body, polygons, boxes, rx, rz, row3,
                 sign * margin, sign * (turn_bucket + pad), kind, full3, scratch3, out[i, k],
             )  # fmt: skip
 

@@ -241,7 +241,7 @@ def search(
     tolerance: float,
     progress: Callable[[float], None],
     rounds: int = 120,
-    patience: int = 40,
+    patience: int = 80,
 ) -> list[Piece]:
     """At most `max_boxes` pieces that cover all points with the least cost found.
 

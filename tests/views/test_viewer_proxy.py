@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import io
-import shutil
 import socket
 import threading
 import time
@@ -20,6 +19,8 @@ import toy_site as toy
 import uvicorn
 import viser
 from fastapi import FastAPI
+from PIL import Image
+from playwright.sync_api import Browser
 from starlette.requests import HTTPConnection
 from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosed, InvalidHandshake
@@ -29,17 +30,6 @@ from backend.shell.app.viewer_proxy import Hooks, viewer_router, views_only
 from cockpit.views.server import HEAD, View, start
 
 PROTOCOL = f"viser-v{viser.__version__}"
-CHROMIUM = next((p for p in map(shutil.which, ("chromium", "chromium-browser")) if p), None)
-FLAGS = [
-    "--no-sandbox",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-]
 
 
 @dataclass
@@ -204,13 +194,7 @@ def test_malformed_messages_do_not_reach_the_scene(front: Front) -> None:
 
 
 @pytest.mark.browser
-@pytest.mark.skipif(CHROMIUM is None, reason="no chromium on this machine")
-def test_a_browser_draws_the_scene(front: Front, repository: Path) -> None:
-    from PIL import Image
-    from playwright.sync_api import sync_playwright
-
-    folder = repository / "artifacts"
-    folder.mkdir(exist_ok=True)
+def test_a_browser_draws_the_scene(front: Front, browser: Browser, artifacts: Path) -> None:
     stop = threading.Event()
     stale = threading.Event()
 
@@ -224,52 +208,48 @@ def test_a_browser_draws_the_scene(front: Front, repository: Path) -> None:
     feeding = threading.Thread(target=feed)
     feeding.start()
     try:
-        with sync_playwright() as play:
-            browser = play.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
-            page = browser.new_page(viewport={"width": 808, "height": 436})
-            errors: list[str] = []
-            page.on("console", lambda m: errors.append(m.text) if m.type == "error" else None)
-            page.on("pageerror", lambda error: errors.append(str(error)))
-            page.goto(f"http://{front.host}/view/w1/?hideViserLogo&darkMode")
+        page = browser.new_page(viewport={"width": 808, "height": 436})
+        errors: list[str] = []
+        page.on("console", lambda m: errors.append(m.text) if m.type == "error" else None)
+        page.on("pageerror", lambda error: errors.append(str(error)))
+        page.goto(f"http://{front.host}/view/w1/?hideViserLogo&darkMode")
 
-            def picture(name: str) -> np.ndarray:
-                data = page.screenshot(path=folder / f"scene-{name}.png")
-                return np.asarray(Image.open(io.BytesIO(data)).convert("RGB"), dtype=int)
+        def picture(name: str) -> np.ndarray:
+            data = page.screenshot(path=artifacts / f"scene-{name}.png")
+            return np.asarray(Image.open(io.BytesIO(data)).convert("RGB"), dtype=int)
 
-            def wait_for(name: str, true: object, seconds: float = 40.0) -> np.ndarray:
-                end = time.monotonic() + seconds
-                while True:
-                    shot = picture(name)
-                    if true(shot):  # type: ignore[operator]
-                        return shot
-                    assert time.monotonic() < end, f"scene-{name}.png does not show it"
-                    time.sleep(0.5)
+        def wait_for(name: str, true: object, seconds: float = 40.0) -> np.ndarray:
+            end = time.monotonic() + seconds
+            while True:
+                shot = picture(name)
+                if true(shot):  # type: ignore[operator]
+                    return shot
+                assert time.monotonic() < end, f"scene-{name}.png does not show it"
+                time.sleep(0.5)
 
-            def sand(shot: np.ndarray) -> int:  # LEFT's tint
-                r, g, b = np.moveaxis(shot, 2, 0)
-                return int(((r > 120) & (r > b + 30) & (abs(r - g) < 40)).sum())
+        def sand(shot: np.ndarray) -> int:  # LEFT's tint
+            r, g, b = np.moveaxis(shot, 2, 0)
+            return int(((r > 120) & (r > b + 30) & (abs(r - g) < 40)).sum())
 
-            def slate(shot: np.ndarray) -> int:  # RIGHT's tint, lit from above
-                r, g, b = np.moveaxis(shot, 2, 0)
-                return int(((r > 140) & (b < 205) & (abs(r - b) < 28) & (g >= r)).sum())
+        def slate(shot: np.ndarray) -> int:  # RIGHT's tint, lit from above
+            r, g, b = np.moveaxis(shot, 2, 0)
+            return int(((r > 140) & (b < 205) & (abs(r - b) < 28) & (g >= r)).sum())
 
-            def purple(shot: np.ndarray) -> int:  # the zone
-                r, g, b = np.moveaxis(shot, 2, 0)
-                return int(((b > g + 12) & (r > g + 6)).sum())
+        def purple(shot: np.ndarray) -> int:  # the zone
+            r, g, b = np.moveaxis(shot, 2, 0)
+            return int(((b > g + 12) & (r > g + 6)).sum())
 
-            first = wait_for(
-                "site", lambda s: sand(s) > 1500 and slate(s) > 800 and purple(s) > 6000
-            )
-            front.view.set_camera("plan", "nobody")
-            time.sleep(1.0)
-            assert purple(picture("site")) == pytest.approx(purple(first), rel=0.05)
-            front.view.set_camera("plan", "w1")
-            plan = wait_for("plan", lambda s: np.abs(s - first).mean() > 3.0 and sand(s) > 800)
-            stale.set()
-            wait_for("stale", lambda s: slate(s) < slate(plan) / 2 and sand(s) > 800)
-            assert not errors
-            assert not page.locator("[data-floating-window]").is_visible()
-            browser.close()
+        first = wait_for("site", lambda s: sand(s) > 1500 and slate(s) > 800 and purple(s) > 6000)
+        front.view.set_camera("plan", "nobody")
+        time.sleep(1.0)
+        assert purple(picture("site")) == pytest.approx(purple(first), rel=0.05)
+        front.view.set_camera("plan", "w1")
+        plan = wait_for("plan", lambda s: np.abs(s - first).mean() > 3.0 and sand(s) > 800)
+        stale.set()
+        wait_for("stale", lambda s: slate(s) < slate(plan) / 2 and sand(s) > 800)
+        assert not errors
+        assert not page.locator("[data-floating-window]").is_visible()
+        page.close()
     finally:
         stop.set()
         feeding.join()

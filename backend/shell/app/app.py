@@ -12,6 +12,7 @@ from urllib.parse import urlsplit
 from fastapi import APIRouter, FastAPI, Request, Response, WebSocket
 from fastapi.responses import FileResponse, JSONResponse
 from fastapi.staticfiles import StaticFiles
+from fastapi_offline import FastAPIOffline
 from starlette.middleware.base import RequestResponseEndpoint
 
 from backend.fusion.pose import Validity
@@ -49,7 +50,7 @@ class Sources:
 
 def create_app(sources: Sources, viewer: APIRouter | None = None) -> FastAPI:
     """The application. viewer: routes of the 3D view, served below /view."""
-    app = FastAPI(
+    app = FastAPIOffline(  # its documentation page needs no network
         title="Excavator cockpit",
         description="Fused poses, distances, warning zones and C-space images of a site's "
         "excavators. SI units and radians; null where a value is unknown. An operator aid, not a "

@@ -1,0 +1,181 @@
+"""Where a machine's base must not stand, exact: its driving zone against a partner's bodies.
+
+Three variants: the machine as it is now, moved without turning; swinging freely in its posture; in
+any posture. And the zone while the heading turns. Polygons contain the true zone and exceed it by at
+most `tolerance`; distances are measured to them, so they err to the safe side by no more than that.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+
+from backend.cspace.driving_posture import moved, swept_arm
+from backend.cspace.driving_profile import Revolved, revolve
+from backend.cspace.driving_revolved import revolved_pieces
+from backend.cspace.driving_tilted import tilted_pieces
+from backend.cspace.driving_turning import turning_pieces
+from backend.cspace.minkowski import Pieces, cover, joined_pieces, slice_pieces
+from backend.machine import kinematics
+from backend.machine.model import Machine
+from backend.spatial import transform
+from backend.spatial.boxes import Boxes
+from backend.spatial.types import Array
+
+TOLERANCE = 8e-4
+"""How far a drawn zone may exceed the true one [m]."""
+
+_LEVEL = 1e-9
+"""A swing axis this close to upright counts as upright [rad]."""
+
+
+@dataclass(frozen=True)
+class Exit:
+    """The way from a point to the edge of a zone.
+
+    signed_distance: [m], positive outside, inf when there is no zone. direction: (2,) unit vector
+    in the plane, the shortest way out from inside; from outside, the way that leads straight away.
+    length: to drive in that direction until free [m], 0 outside.
+    """
+
+    signed_distance: float
+    direction: Array
+    length: float
+
+
+@dataclass(frozen=True)
+class DrivingZone:
+    """Positions (x, y) of the base, in the frame of its pose, that bring contact.
+
+    Geometries are shapely Polygons or MultiPolygons with holes [m], empty when nothing is in reach.
+    """
+
+    as_is: shapely.Geometry
+    any_swing: shapely.Geometry
+    any_posture: shapely.Geometry
+    exits: dict[str, Exit]  # "as_is", "any_swing", "any_posture": from the base's own position
+
+    @property
+    def signed_distances(self) -> dict[str, float]:
+        """Variant -> distance of the base from the zone's edge [m], positive outside."""
+        return {name: exit_.signed_distance for name, exit_ in self.exits.items()}
+
+
+def driving_zone(
+    own_machine: Machine,
+    own_q: Array,
+    T_own_base: Array,
+    partner_boxes: Boxes,
+    eta: float = 0.0,
+    tolerance: float = TOLERANCE,
+) -> DrivingZone:
+    """All three variants of the zone that `own_machine` must not drive into.
+
+    own_q: (n,) [rad]; T_own_base: (4, 4), the URDF root in any frame with z up; partner_boxes: in
+    the same frame; eta: inflation [m], every partner box grown by it on every side (this contains
+    the ball of radius eta). The first call for a machine sweeps its arm and takes about a second.
+    Raises ValueError for a negative or infinite eta and a tolerance that is not positive.
+    """
+    _check(eta, tolerance)
+    T, bodies = _local(T_own_base, partner_boxes, eta)
+    own = kinematics.body_boxes(own_machine, kinematics.link_poses(own_machine, own_q, T))
+    tracks = np.array([own_machine.part_of_body(b) == "tracks" for b in range(len(own))])
+    parked = slice_pieces(bodies, own.take(tracks))
+    # Half of the tolerance for the radii of the solid, half for drawing its arcs.
+    part = 0.5 * tolerance
+    now = cover(slice_pieces(bodies, own))
+    swing = cover(joined_pieces([parked, _swinging(own_machine, own, own_q, tracks, T, bodies, part)]))
+    arm = swept_arm(own_machine, part)
+    posture = cover(joined_pieces([parked, _about(arm, T @ own_machine.arm.T_root_swing, bodies, part)]))
+    base = np.asarray(T_own_base, dtype=float)[:2, 3]
+    zones = {"as_is": now, "any_swing": swing, "any_posture": posture}
+    exits = {name: way_out(zone, np.zeros(2)) for name, zone in zones.items()}
+    placed = {name: shapely.transform(zone, lambda p: p + base) for name, zone in zones.items()}
+    return DrivingZone(exits=exits, **placed)
+
+
+def turning_zone(
+    own_machine: Machine,
+    own_q: Array,
+    T_own_base: Array,
+    partner_boxes: Boxes,
+    turn: tuple[float, float] = (0.0, 2.0 * np.pi),
+    eta: float = 0.0,
+    tolerance: float = TOLERANCE,
+) -> shapely.Geometry:
+    """The zone of the machine as it is while its heading turns on the spot about the base.
+
+    turn: first and last heading relative to the present one [rad]; a full circle is exact to
+    `tolerance`, less than that is covered in steps (see `turning_pieces`). Other arguments as in
+    `driving_zone`.
+    """
+    _check(eta, tolerance)
+    if not turn[0] <= turn[1]:
+        raise ValueError(f"turn must lead from a smaller to a larger angle, not {turn}")
+    T, bodies = _local(T_own_base, partner_boxes, eta)
+    own = kinematics.body_boxes(own_machine, kinematics.link_poses(own_machine, own_q, T))
+    if turn[1] - turn[0] >= 2.0 * np.pi:
+        pieces = revolved_pieces(revolve(own, 0.5 * tolerance), bodies, 0.5 * tolerance)
+    else:
+        pieces = turning_pieces(bodies, own, turn[0], turn[1], tolerance)
+    base = np.asarray(T_own_base, dtype=float)[:2, 3]
+    return shapely.transform(cover(pieces), lambda p: p + base)
+
+
+def way_out(zone: shapely.Geometry, point: Array) -> Exit:
+    """Signed distance and shortest way from a point (2,) to the edge of a zone."""
+    if zone.is_empty:
+        return Exit(float("inf"), np.array([1.0, 0.0]), 0.0)
+    here = shapely.Point(point)
+    inside = bool(shapely.covers(zone, here))
+    line = shapely.get_coordinates(shapely.shortest_line(here, zone.boundary))
+    step = line[1] - line[0] if inside else line[0] - line[1]
+    length = float(np.hypot(*step))
+    direction = step / length if length > 0.0 else np.array([1.0, 0.0])
+    return Exit(-length if inside else length, direction, length if inside else 0.0)
+
+
+def _swinging(
+    machine: Machine, own: Boxes, q: Array, tracks: Array, T: Array, bodies: Boxes, part: float
+) -> Pieces:
+    """The bodies above the swing joint, swung over their limits, or all the way round."""
+    T_site_swing = T @ machine.arm.T_root_swing
+    upper = moved(own.take(~tracks), transform.inverse(T_site_swing))
+    swing = machine.joints[0]
+    upright = np.hypot(*T_site_swing[:2, 2]) <= _LEVEL
+    if upright and not swing.continuous and swing.upper - swing.lower < 2.0 * np.pi:
+        link = next(link for link in machine.links if link.joint == 0)
+        i = machine.links.index(link)
+        axis = kinematics.link_poses(machine, q, T)[i, :3, :3] @ link.axis
+        ends = sorted(np.sign(axis[2]) * (np.array([swing.lower, swing.upper]) - q[0]))
+        origin = T_site_swing[:3, 3]
+        still = Boxes(bodies.centers - origin, bodies.rotations, bodies.half_extents)
+        R = T_site_swing.copy()
+        R[:3, 3] = 0.0
+        return turning_pieces(still, moved(upper, R), float(ends[0]), float(ends[1]), 2.0 * part)
+    return _about(revolve(upper, part), T_site_swing, bodies, part)
+
+
+def _about(solid: Revolved, T_site_axis: Array, bodies: Boxes, part: float) -> Pieces:
+    if np.hypot(*T_site_axis[:2, 2]) > _LEVEL:
+        return tilted_pieces(solid, T_site_axis, bodies, part)
+    shifted = Boxes(bodies.centers - T_site_axis[:3, 3], bodies.rotations, bodies.half_extents)
+    return revolved_pieces(solid, shifted, part)
+
+
+def _local(T_own_base: Array, partner_boxes: Boxes, eta: float) -> tuple[Array, Boxes]:
+    """Both machines with the own base at the origin, where numbers are small; partner inflated."""
+    T = np.array(T_own_base, dtype=float)
+    base = T[:3, 3].copy()
+    T[:3, 3] = 0.0
+    bodies = Boxes(partner_boxes.centers - base, partner_boxes.rotations, partner_boxes.half_extents)
+    return T, bodies.inflated(eta) if eta > 0.0 else bodies
+
+
+def _check(eta: float, tolerance: float) -> None:
+    if not (np.isfinite(eta) and eta >= 0.0):
+        raise ValueError(f"eta must be 0 or more metres, not {eta}")
+    if not (np.isfinite(tolerance) and tolerance > 0.0):
+        raise ValueError(f"tolerance must be more than 0 metres, not {tolerance}")

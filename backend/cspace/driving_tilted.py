@@ -1,0 +1,190 @@
+"""Driving zone of a solid of revolution whose axis is tilted, against convex bodies.
+
+For a body a and a convex run k the zone is the slice at height 0 of the Minkowski difference a - k.
+Its support in a horizontal direction u is min over b of h(u cos b + z sin b) / cos b, h being the
+support of the difference (the dual of maximising u over the slice), and every b gives a line that
+bounds the zone from outside. Lines are added where the polygon still exceeds the chord of two points
+of the zone by more than the tolerance. Cavities around the axis are filled: never unsafe, and too
+large where a body would hang inside one.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from backend.cspace.driving_profile import Revolved, thickened
+from backend.cspace.minkowski import Pieces, convex_hull
+from backend.spatial.boxes import Boxes
+from backend.spatial.types import Array, IntArray
+
+_BISECTIONS = 46
+_MOST = 2048
+
+
+def tilted_pieces(solid: Revolved, T_site_axis: Array, bodies: Boxes, tolerance: float) -> Pieces:
+    """Shifts (x, y) [m] of the solid for which it touches a body, as pieces of a union.
+
+    T_site_axis: (4, 4), the frame of the solid's axis where it stands; bodies: boxes in the site
+    frame, z up.
+    """
+    a = thickened(bodies)
+    points, start = _tilted(
+        *(np.ascontiguousarray(v) for v in (a.centers, a.rotations, a.half_extents)),
+        np.ascontiguousarray(T_site_axis[:3, 3]),
+        np.ascontiguousarray(T_site_axis[:3, 2]),
+        solid.z,
+        solid.outer,
+        solid.start,
+        tolerance,
+    )
+    return Pieces(points, start, np.zeros((0, 2)), np.zeros_like(start))
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _extreme(
+    c: Array, R: Array, h: Array, o: Array, k: Array, z: Array, r: Array, w: Array, out: Array
+) -> float:
+    """The farthest point of a - k in direction w (3,), into out (3,); its distance along w."""
+    along = -(w[0] * k[0] + w[1] * k[1] + w[2] * k[2])
+    across = -w - along * k
+    length = np.sqrt((across * across).sum())
+    best, at = -np.inf, 0
+    for e in range(len(z)):
+        value = along * z[e] + length * r[e]
+        if value > best:
+            best, at = value, e
+    out[:] = c - o - z[at] * k
+    if length > 1e-14:
+        out -= r[at] / length * across
+    for i in range(3):
+        side = w[0] * R[0, i] + w[1] * R[1, i] + w[2] * R[2, i]
+        out += (h[i] if side >= 0.0 else -h[i]) * R[:, i]
+    return float((w * out).sum())
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _line(
+    c: Array, R: Array, h: Array, o: Array, k: Array, z: Array, r: Array, row: Array
+) -> None:
+    """For the direction row[:2]: the bound of the zone into row[2], a point of it into row[3:5]."""
+    low, high = -0.5 * np.pi + 1e-6, 0.5 * np.pi - 1e-6
+    w, p = np.empty(3), np.empty(3)
+    below, above = np.empty(3), np.empty(3)
+    bound = np.inf
+    under, over = False, False
+    for step in range(_BISECTIONS):
+        b = low if step == 0 else (high if step == 1 else 0.5 * (low + high))
+        w[0], w[1], w[2] = row[0] * np.cos(b), row[1] * np.cos(b), np.sin(b)
+        bound = min(bound, _extreme(c, R, h, o, k, z, r, w, p) / np.cos(b))
+        if p[2] <= 0.0:
+            low, under = b, True
+            below[:] = p
+        else:
+            high, over = b, True
+            above[:] = p
+        if step == 1 and not (under and over):
+            break
+    row[2] = bound
+    if under and over:
+        s = below[2] / (below[2] - above[2])
+        row[3:5] = below[:2] + s * (above[:2] - below[:2])
+    else:
+        row[3:5] = below[:2] if under else above[:2]
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _outline(
+    c: Array,
+    R: Array,
+    h: Array,
+    o: Array,
+    k: Array,
+    z: Array,
+    r: Array,
+    tolerance: float,
+    corners: Array,
+) -> int:
+    """Vertices of the circumscribed polygon of one pair, their number."""
+    stack = np.empty((128, 5))
+    first, row = np.empty(5), np.empty(5)
+    n = 0
+    for d in range(4):
+        angle = 0.5 * np.pi * (3 - d)
+        stack[d, 0], stack[d, 1] = np.cos(angle), np.sin(angle)
+        _line(c, R, h, o, k, z, r, stack[d])
+    first[:] = stack[3]
+    row[:] = first
+    size = 3
+    closing = True
+    while size > 0 or closing:
+        if size == 0:
+            stack[0] = first
+            size, closing = 1, False
+        ahead = stack[size - 1]
+        turn = row[0] * ahead[1] - row[1] * ahead[0]
+        if turn > 1e-7:
+            x = (row[2] * ahead[1] - ahead[2] * row[1]) / turn
+            y = (ahead[2] * row[0] - row[2] * ahead[0]) / turn
+            dx, dy = ahead[3] - row[3], ahead[4] - row[4]
+            length = np.hypot(dx, dy)
+            if length > 1e-9:
+                excess = (dy * (x - row[3]) - dx * (y - row[4])) / length
+                nx, ny = dy / length, -dx / length
+            else:
+                excess = np.hypot(x - row[3], y - row[4])
+                nx, ny = row[0] + ahead[0], row[1] + ahead[1]
+                nx, ny = nx / np.hypot(nx, ny), ny / np.hypot(nx, ny)
+            between = row[0] * ny - row[1] * nx > 1e-7 and nx * ahead[1] - ny * ahead[0] > 1e-7
+            if excess > tolerance and between and size < 127 and n < len(corners) - 4:
+                stack[size, 0], stack[size, 1] = nx, ny
+                _line(c, R, h, o, k, z, r, stack[size])
+                size += 1
+                continue
+            corners[n] = x, y
+            n += 1
+        else:
+            # Nearly parallel lines: their crossing is ill-conditioned, their far ends are not.
+            for end in range(2):
+                q = row if end == 0 else ahead
+                gap = q[2] - q[0] * q[3] - q[1] * q[4]
+                corners[n] = q[3] + gap * q[0], q[4] + gap * q[1]
+                n += 1
+        row[:] = ahead
+        size -= 1
+    return n
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _tilted(
+    ca: Array,
+    Ra: Array,
+    ha: Array,
+    o: Array,
+    k: Array,
+    z: Array,
+    outer: Array,
+    start: IntArray,
+    tolerance: float,
+) -> tuple[Array, IntArray]:
+    points = np.empty((4096, 2))
+    ends = np.zeros(len(ca) * (len(start) - 1) + 1, np.int64)
+    corners, ring = np.empty((_MOST, 2)), np.empty((_MOST, 2))
+    up, down, p = np.array([0.0, 0.0, 1.0]), np.array([0.0, 0.0, -1.0]), np.empty(3)
+    made = 0
+    for e in range(len(start) - 1):
+        run = slice(start[e], start[e + 1])
+        for i in range(len(ca)):
+            body = (ca[i], Ra[i], ha[i])
+            if _extreme(*body, o, k, z[run], outer[run], up, p) < 0.0:
+                continue
+            if _extreme(*body, o, k, z[run], outer[run], down, p) < 0.0:
+                continue
+            n = _outline(*body, o, k, z[run], outer[run], tolerance, corners)
+            m = convex_hull(corners, n, ring)
+            while ends[made] + m > len(points):
+                points = np.concatenate((points, np.empty_like(points)))
+            points[ends[made] : ends[made] + m] = ring[:m]
+            ends[made + 1] = ends[made] + m
+            made += 1 if m else 0
+    return points[: ends[made]].copy(), ends[: made + 1].copy()

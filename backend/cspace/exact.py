@@ -1,0 +1,252 @@
+"""Exact and certified joint images: which configurations of an excavator touch what.
+
+Bodies are the machine's own boxes on tracks, upper body and arm. Obstacles are oriented boxes in
+the root frame, so that a sloping base costs nothing. Images are bits, packed along the bucket.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from backend.cspace.exact_kernel import EXACT, INNER, OUTER, Cells, Chain, image_kernel
+from backend.cspace.exact_upper import touching_swings
+from backend.cspace.planar_arm import PlanarArm, Profiles, planar_arm
+from backend.cspace.rows import Row
+from backend.machine.kinematics import body_boxes, link_poses
+from backend.machine.model import PARTS, Machine
+from backend.spatial import transform
+from backend.spatial.boxes import Boxes
+from backend.spatial.types import AnyArray, Array, BoolArray, IntArray, frozen
+
+__all__ = ["EXACT", "INNER", "OUTER", "ArmModel", "JointGrid", "arm_model", "blocked", "joint_grid"]
+
+
+@dataclass(frozen=True)
+class JointGrid:
+    """Cells of swing, boom, stick and bucket. lower, upper: (4,) edges of the whole [rad], the same
+    where a joint is held at one value; shape: cells of each joint.
+    """
+
+    lower: Array
+    upper: Array
+    shape: tuple[int, int, int, int]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "lower", frozen(self.lower, (4,), "lower"))
+        object.__setattr__(self, "upper", frozen(self.upper, (4,), "upper"))
+        span = self.upper - self.lower
+        if (span < 0.0).any() or (span > 2.0 * np.pi + 1e-9).any():
+            raise ValueError("a joint's cells must cover between none and one whole turn")
+        if len(self.shape) != 4 or min(self.shape) < 1:
+            raise ValueError(f"shape must be four numbers of at least 1, not {self.shape}")
+
+    @property
+    def steps(self) -> Array:
+        """(4,) width of a cell [rad]."""
+        return (self.upper - self.lower) / np.array(self.shape)
+
+    def centers(self, joint: int) -> Array:
+        """(n,) [rad]."""
+        n = self.shape[joint]
+        return np.asarray(self.lower[joint] + (np.arange(n) + 0.5) * self.steps[joint])
+
+    def edges(self, joint: int) -> Array:
+        """(n+1,) [rad]."""
+        return np.linspace(self.lower[joint], self.upper[joint], self.shape[joint] + 1)
+
+    @property
+    def words(self) -> int:
+        """Words of 64 cells in a row of the bucket."""
+        return (self.shape[3] + 63) // 64
+
+
+def joint_grid(
+    machine: Machine, shape: tuple[int, int, int, int], swing: float | None = None
+) -> JointGrid:
+    """The joints' whole ranges, a full turn from -pi where there is no limit.
+
+    swing: hold the swing at this value (its shape must then be 1) [rad].
+    """
+    lower, upper = machine.lower[:4].copy(), machine.upper[:4].copy()
+    lower[~np.isfinite(lower)], upper[~np.isfinite(upper)] = -np.pi, np.pi
+    if swing is not None:
+        lower[0] = upper[0] = swing
+    return JointGrid(lower, upper, shape)
+
+
+@dataclass(frozen=True)
+class ArmModel:
+    """A machine prepared for the kernels, its bodies grown by `inflation` [m] on every side.
+
+    tracks, upper: (k,) body indices; boxes: all bodies at joint values 0 (tilt and rotate as they
+    are held) in the root frame, grown; as_built: the same, not grown. self_pairs: (n, n).
+    """
+
+    machine: Machine
+    inflation: float
+    arm: PlanarArm
+    chain: Chain
+    tracks: IntArray
+    upper: IntArray
+    boxes: Boxes
+    as_built: Boxes
+    self_pairs: BoolArray
+
+
+def arm_model(machine: Machine, rest: Array | None = None, inflation: float = 0.0) -> ArmModel:
+    """Prepare `machine`. rest: (n,) joint values, of which tilt and rotate are held.
+
+    Raises ValueError when the arm does not move in a plane, or inflation is not 0 or more.
+    """
+    if not (np.isfinite(inflation) and inflation >= 0.0):
+        raise ValueError(f"inflation must be 0 or more metres, not {inflation}")
+    q = np.zeros(len(machine.joints))
+    if rest is not None:
+        q[4:] = np.asarray(rest, dtype=float)[4:]
+    arm = planar_arm(machine, rest, inflation)
+    as_built = body_boxes(machine, link_poses(machine, q))
+    part = np.array([PARTS.index(machine.part_of_body(b)) for b in range(len(machine.bodies))])
+    pairs = np.zeros((len(part), len(part)), dtype=bool)
+    for a, b in machine.self_pairs:
+        pairs[a, b] = pairs[b, a] = True
+    chain = Chain(
+        arm.pivot.copy(),
+        arm.boom.copy(),
+        arm.stick.copy(),
+        arm.boxes.centers.copy(),
+        arm.boxes.rotations.copy(),
+        arm.boxes.half_extents.copy(),
+        ~arm.aligned,
+    )
+    return ArmModel(
+        machine=machine,
+        inflation=inflation,
+        arm=arm,
+        chain=chain,
+        tracks=np.flatnonzero(part == 0),
+        upper=np.flatnonzero(part == 1),
+        boxes=as_built.inflated(inflation),
+        as_built=as_built,
+        self_pairs=pairs,
+    )
+
+
+def blocked(model: ArmModel, grid: JointGrid, obstacles: Boxes, kind: int = EXACT) -> AnyArray:
+    """Which cells touch obstacles (in the root frame): uint64 (swing, boom, stick, words).
+
+    kind: EXACT at the cells' centres; OUTER everything that is not certified free; INNER what is
+    certified to be blocked. The whole machine counts: where the tracks touch, all is blocked.
+    """
+    pairs = np.ones((len(model.boxes), len(obstacles)), dtype=bool)
+    base = np.zeros(grid.shape[0], dtype=bool)
+    if len(obstacles):
+        T = transform.inverse(model.arm.T_root_arm)
+        placed = _moved(T, obstacles)
+        still = touching_swings(
+            _moved(T, model.boxes.take(model.tracks)), placed, pairs[model.tracks], np.zeros(1),
+            kind=kind,
+        )  # fmt: skip
+        turning = touching_swings(
+            _moved(T, model.boxes.take(model.upper)), placed, pairs[model.upper],
+            model.arm.swing_sign * grid.centers(0), float(grid.steps[0]) / 2.0, kind,
+        )  # fmt: skip
+        base = still | turning
+    return _image(model, grid, obstacles, pairs[model.arm.bodies], base, kind)
+
+
+def self_blocked(model: ArmModel, grid: JointGrid, kind: int = EXACT) -> AnyArray:
+    """Which cells touch the machine itself: uint64 (swing, boom, stick, words); as `blocked`.
+
+    The body farther out is grown by the model's inflation, the other is as built.
+    """
+    out = _self_part(model, grid, model.tracks, kind)
+    out |= _self_part(model, _hold(grid, 0, 0.0), model.upper, kind)
+    bodies, groups = model.arm.bodies, model.arm.groups
+    held = _hold(_hold(grid, 0, 0.0), 1, 0.0)
+    out |= _self_part(model, held, bodies[groups == 0], kind)
+    held = _hold(held, 2, 0.0)
+    out |= _self_part(model, held, bodies[groups == 1], kind)
+    held = _hold(held, 3, 0.0)
+    inside = _self_part(model, held, bodies[groups == 2], kind)
+    if inside.any():
+        out[:] = _full_words(grid)
+    return out
+
+
+def _self_part(model: ArmModel, grid: JointGrid, others: IntArray, kind: int) -> AnyArray:
+    """Bodies `others`, where they stand at joint values 0, as obstacles to what is farther out."""
+    bodies = model.arm.bodies
+    pairs = model.self_pairs[np.ix_(bodies, others)]
+    # Each pair once, seen from the body that is farther out.
+    pairs = pairs & (bodies[:, None] > others[None, :])
+    used = pairs.any(axis=0)
+    obstacles = model.as_built.take(others[used])
+    none = np.zeros(grid.shape[0], dtype=bool)
+    return _image(model, grid, obstacles, pairs[:, used], none, kind)
+
+
+def _hold(grid: JointGrid, joint: int, value: float) -> JointGrid:
+    """The grid with one joint held: its one cell stands for all."""
+    lower, upper, shape = grid.lower.copy(), grid.upper.copy(), list(grid.shape)
+    lower[joint] = upper[joint] = value
+    shape[joint] = 1
+    return JointGrid(lower, upper, (shape[0], shape[1], shape[2], shape[3]))
+
+
+def _image(
+    model: ArmModel,
+    grid: JointGrid,
+    obstacles: Boxes,
+    pairs: BoolArray,
+    base: BoolArray,
+    kind: int,
+) -> AnyArray:
+    out = np.zeros((*grid.shape[:3], grid.words), dtype=np.uint64)
+    if not base.any() and not pairs.any():
+        return out
+    T_arm_root = model.arm.T_arm_root(grid.centers(0))[:, :3, :].copy()
+    signs = model.arm.signs
+    rows = [
+        Row(float(signs[k] * grid.centers(k + 1)[0]), float(signs[k] * _step(grid, k + 1)), n)
+        for k, n in enumerate(grid.shape[1:])
+    ]
+    halves = np.zeros(4) if kind == EXACT else grid.steps / 2.0
+    body: Profiles = model.arm.inner if kind == INNER else model.arm.outer
+    image_kernel(
+        model.chain,
+        body,
+        (obstacles.centers.copy(), obstacles.rotations.copy(), obstacles.half_extents.copy()),
+        np.ascontiguousarray(pairs),
+        T_arm_root,
+        Cells(rows[0], rows[1], rows[2], kind, halves),
+        base,
+        out,
+    )
+    return out
+
+
+def _step(grid: JointGrid, joint: int) -> float:
+    """The cells' width; any angle where there is only one cell without width."""
+    return float(grid.steps[joint]) or 1e-3
+
+
+def _full_words(grid: JointGrid) -> AnyArray:
+    bits = np.zeros(64 * grid.words, dtype=bool)
+    bits[: grid.shape[3]] = True
+    return np.packbits(bits, bitorder="little").view(np.uint64)
+
+
+def _moved(T: Array, boxes: Boxes) -> Boxes:
+    """Boxes in another frame. T: (4, 4)."""
+    return Boxes(
+        transform.apply(T, boxes.centers), T[:3, :3] @ boxes.rotations, boxes.half_extents
+    )
+
+
+def unpacked(bits: AnyArray, cells: int) -> BoolArray:
+    """(..., cells) booleans of bits (..., words)."""
+    octets = np.ascontiguousarray(bits).view(np.uint8)
+    flat = np.unpackbits(octets, axis=-1, bitorder="little", count=cells)
+    return np.asarray(flat.view(bool))

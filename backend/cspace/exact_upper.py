@@ -1,0 +1,129 @@
+"""Whether a body that turns with the swing, or does not turn at all, touches obstacles."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from backend.cspace.exact_boxes import gap
+from backend.spatial.boxes import Boxes
+from backend.spatial.types import Array, BoolArray
+
+DEPTH = 6
+"""A swing cell is halved at most this often before it stays undecided."""
+_PAD = 1e-9
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _turned_gap(
+    center: Array, R: Array, half: Array, c: Array, Q: Array, h: Array, angle: float, enough: float
+) -> float:
+    """`gap` of a box turned about z by `angle` from an obstacle (c, Q, h)."""
+    cos, sin = math.cos(angle), math.sin(angle)
+    at, turned = np.empty(3), np.empty((3, 3))
+    at[0], at[1] = cos * center[0] - sin * center[1], sin * center[0] + cos * center[1]
+    at[2] = center[2]
+    for k in range(3):
+        turned[0, k] = cos * R[0, k] - sin * R[1, k]
+        turned[1, k] = sin * R[0, k] + cos * R[1, k]
+        turned[2, k] = R[2, k]
+    return float(gap(at, turned, half, c, Q, h, enough))
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _decide(
+    own: tuple[Array, Array, Array],
+    others: tuple[Array, Array, Array],
+    pairs: BoolArray,
+    radius: Array,
+    angle: float,
+    half_cell: float,
+    colliding: bool,
+    depth: int,
+) -> bool:
+    """With `colliding`: whether some pair surely touches at every angle of the cell. Without:
+    whether some pair may touch at some angle.
+    """
+    chord = 2.0 * math.sin(0.5 * min(half_cell, math.pi))
+    maybe = False
+    for i in range(len(own[0])):
+        # No point of the body moves farther than this within the cell.
+        moved = radius[i] * chord + _PAD
+        for j in range(len(others[0])):
+            if not pairs[i, j]:
+                continue
+            g = _turned_gap(
+                own[0][i], own[1][i], own[2][i], others[0][j], others[1][j], others[2][j],
+                angle, moved,
+            )  # fmt: skip
+            if g < -moved:
+                return True
+            if g <= moved:
+                maybe = True
+    if not maybe or depth == 0:
+        return maybe and not colliding
+    quarter = 0.5 * half_cell
+    first = _decide(own, others, pairs, radius, angle - quarter, quarter, colliding, depth - 1)
+    if first != colliding:
+        return first
+    return bool(
+        _decide(own, others, pairs, radius, angle + quarter, quarter, colliding, depth - 1)
+    )
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _states(
+    own: tuple[Array, Array, Array],
+    others: tuple[Array, Array, Array],
+    pairs: BoolArray,
+    radius: Array,
+    angles: Array,
+    half_cell: float,
+    kind: int,
+    depth: int,
+) -> BoolArray:
+    out = np.zeros(len(angles), np.bool_)
+    for s in range(len(angles)):
+        if kind != 0:
+            out[s] = _decide(own, others, pairs, radius, angles[s], half_cell, kind < 0, depth)
+            continue
+        for i in range(len(own[0])):
+            for j in range(len(others[0])):
+                if pairs[i, j] and not out[s]:
+                    g = _turned_gap(
+                        own[0][i], own[1][i], own[2][i], others[0][j], others[1][j], others[2][j],
+                        angles[s], 0.0,
+                    )  # fmt: skip
+                    out[s] = g <= 0.0
+    return out
+
+
+def touching_swings(
+    own: Boxes,
+    obstacles: Boxes,
+    pairs: BoolArray,
+    angles: Array,
+    half_cell: float = 0.0,
+    kind: int = 0,
+) -> BoolArray:
+    """(n,) whether boxes that turn about z by `angles` (n,) [rad] touch obstacles.
+
+    Both in one frame with z the swing axis. kind: 0 at the angles themselves; 1 whether they may
+    touch somewhere within half_cell [rad] of an angle; -1 whether they surely touch at each angle
+    within it. pairs: (own, obstacles) which count.
+    """
+    corners = own.corners()
+    radius = np.hypot(corners[:, :, 0], corners[:, :, 1]).max(axis=1, initial=0.0)
+    found = _states(
+        (own.centers, own.rotations, own.half_extents),
+        (obstacles.centers, obstacles.rotations, obstacles.half_extents),
+        np.ascontiguousarray(pairs),
+        radius,
+        np.ascontiguousarray(angles, dtype=float),
+        float(half_cell),
+        kind,
+        DEPTH,
+    )
+    return np.asarray(found, dtype=bool)

@@ -1,0 +1,128 @@
+"""The page in a real browser against real processes: it draws what the snapshot says."""
+
+from __future__ import annotations
+
+import io
+import json
+import signal
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from live import Backend, all_valid, backend, serve, simulate, simulated
+from PIL import Image
+from watched import CANVASES, SIZES, Watch
+
+pytestmark = [pytest.mark.browser, pytest.mark.processes, pytest.mark.timeout(300)]
+
+
+@pytest.fixture(scope="module")
+def moving() -> Iterator[Backend]:
+    with backend("demo") as running:
+        running.wait_for(all_valid)
+        yield running
+
+
+def test_every_panel_lives_and_both_machines_move(
+    moving: Backend, watch: Watch, artifacts: Path
+) -> None:
+    watched = watch(moving.url, SIZES[0])
+    first, one = watched.snapshot(), watched.canvases()
+    changed: set[str] = set()
+    moved: set[str] = set()
+    until = time.monotonic() + 40.0
+    while time.monotonic() < until and (len(moved) < 2 or len(changed) < 7):
+        time.sleep(0.5)
+        now, other = watched.snapshot(), watched.canvases()
+        changed |= {name for name in CANVASES if other[name]["state"] != one[name]["state"]}
+        for name, machine in now["machines"].items():
+            before = first["machines"][name]["joints"]
+            if max(abs(machine["joints"][j] - before[j]) for j in before) > 0.1:
+                moved.add(name)
+    assert moved == {"left", "right"}
+    # "limits" changes only when something is near.
+    assert changed >= set(CANVASES) - {"limits"}
+    watched.page.screenshot(path=artifacts / "demo-1920x1080.png")
+    assert watched.errors == []
+
+
+@pytest.mark.parametrize("size", SIZES, ids=lambda s: f"{s[0]}x{s[1]}")
+def test_nothing_is_clipped_and_nothing_scrolls(
+    moving: Backend, watch: Watch, artifacts: Path, size: tuple[int, int]
+) -> None:
+    watched = watch(moving.url, size)
+    time.sleep(1.0)
+    page = watched.page
+    assert page.evaluate(
+        "[document.documentElement.scrollWidth <= innerWidth,"
+        " document.documentElement.scrollHeight <= innerHeight]"
+    ) == [True, True]
+    outside = page.evaluate(
+        """() => [...document.querySelectorAll("main, section, header, canvas, button")]
+          .filter(n => n.checkVisibility()).map(n => [n.id, n.getBoundingClientRect()])
+          .filter(([id, r]) => r.left < -1 || r.top < -1 || r.right > innerWidth + 1
+            || r.bottom > innerHeight + 1).map(([id]) => id)"""
+    )
+    assert outside == []
+    clipped = page.evaluate(
+        """() => [...document.querySelectorAll("#top *, #alarm *, .panel > header *")]
+          .filter(n => n.children.length === 0 && n.checkVisibility()
+            && n.scrollWidth > n.clientWidth + 1 && n.clientWidth > 0)
+          .map(n => n.id || n.textContent)"""
+    )
+    assert clipped == []
+    page.screenshot(path=artifacts / f"demo-calm-{size[0]}x{size[1]}.png")
+
+
+def test_the_3d_scene_shows_the_machines(moving: Backend, watch: Watch) -> None:
+    watched = watch(moving.url, SIZES[0])
+    time.sleep(6.0)
+    frame = watched.page.locator("#scene")
+    picture = Image.open(io.BytesIO(frame.screenshot())).convert("RGB")
+    pixels = np.asarray(picture, dtype=int)
+    # Machine yellow is the only warm colour of a calm scene.
+    warm = (pixels[..., 0] > pixels[..., 2] + 25) & (pixels[..., 0] > 60)
+    assert warm.sum() > 200
+
+
+def test_a_killed_machine_is_stale_on_the_page_and_recovers(watch: Watch) -> None:
+    site = "demo"
+    with serve(site) as station, simulated(site, station.endpoint, "left", "right") as processes:
+        station.wait_for(all_valid)
+        watched = watch(station.url, SIZES[1])
+        page = watched.page
+        page.evaluate(
+            """() => { window.staleAt = null; const look = () => {
+              const s = window.cockpit.state.snapshot;
+              if (window.staleAt === null && s && s.machines.right.validity !== "VALID")
+                window.staleAt = Date.now() / 1000;
+              setTimeout(look, 5); }; look(); }"""
+        )
+        processes["right"].send_signal(signal.SIGKILL)
+        killed = time.time()
+        page.wait_for_function("window.staleAt !== null", timeout=5000)
+        assert page.evaluate("window.staleAt") - killed <= 0.35  # 0.3 s and a timer's turn
+        page.wait_for_function(
+            "document.getElementById('alarm-line').textContent.startsWith('UNKNOWN')"
+        )
+        line = page.inner_text("#alarm-line")
+        assert "RIGHT" in line
+        assert "CLEAR" not in page.inner_text("#alarm")
+        assert json.loads(page.get_attribute("#plan", "data-state") or "{}")["nearest"] is None
+        processes["right"].wait()
+        processes["right"] = simulate(site, "right", station.endpoint)
+        page.wait_for_function(
+            "window.cockpit.state.snapshot.machines.right.validity === 'VALID'", timeout=40_000
+        )
+        assert watched.errors == []
+
+
+def test_a_reconnecting_page_is_current_within_two_seconds(moving: Backend, watch: Watch) -> None:
+    watched = watch(moving.url, SIZES[1])
+    page = watched.page
+    page.reload()
+    begun = time.monotonic()
+    page.wait_for_function("window.cockpit?.state.snapshot !== null", timeout=10_000)
+    assert time.monotonic() - begun < 2.0
