@@ -131,13 +131,7 @@ class Station:
             site.rates.image_hz,
         )
         frames = Frames(self.hub, self.document)
-        relay = Relay(
-            session,
-            self.hub,
-            lambda s: dumps(self.document(s)),
-            lambda s: dumps(self.document(s)["alarms"]),
-            frames.images,
-        )
+        relay = Relay(session, self.hub, self._texts, frames.images)
         self.view: View = start(scene_site(site, models), self.hub, own=self.config.own[0])
         self._closing.callback(self.view.stop)
         sources = Sources(
@@ -170,6 +164,10 @@ class Station:
         if self._demo_began is not None:
             document["demo"] = {"elapsed": time.time() - self._demo_began()}
         return document
+
+    def _texts(self, snapshot: Snapshot) -> tuple[str, str]:
+        document = self.document(snapshot)
+        return dumps(document), dumps(document["alarms"])
 
     def backend(self) -> dict[str, Any]:
         """Live timings of both loops."""

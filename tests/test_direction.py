@@ -34,7 +34,7 @@ ROOMS: dict[str, set[str]] = {
         "backend.errors",
     },
     "backend.shell": {"backend"},
-    "backend.warm": {"backend.machine"},
+    "backend.warm": {"backend.collision", "backend.machine", "backend.spatial"},
     "cockpit": {"backend", "cockpit"},
 }
 

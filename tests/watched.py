@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -26,7 +27,14 @@ class Watched:
         self.page.on("pageerror", lambda error: self.errors.append(str(error)))
         self.page.on("console", lambda m: self.errors.append(m.text) if m.type == "error" else None)
         self.page.goto(url)
-        self.page.wait_for_function("document.body.dataset.ready === '1'", timeout=60_000)
+        self.until("document.body.dataset.ready === '1'", 60.0)
+
+    def until(self, condition: str, timeout: float = 30.0) -> None:
+        """Waits for a JavaScript condition. (The page's policy forbids Playwright's own wait.)"""
+        deadline = time.monotonic() + timeout
+        while not self.page.evaluate(f"() => Boolean({condition})"):
+            assert time.monotonic() < deadline, f"not within {timeout} s: {condition}"
+            time.sleep(0.05)
 
     def canvases(self) -> dict[str, Any]:
         found: dict[str, Any] = self.page.evaluate(STATES, CANVASES)

@@ -42,7 +42,7 @@ def closest_pairs(a: Boxes, b: Boxes, within: float = 0.0) -> ClosePairs:
     """
     if len(a) == 0 or len(b) == 0:
         return ClosePairs(np.zeros((0, 2), np.int64), np.zeros(0), np.zeros((0, 2, 3)), 0.0)
-    bound = _lower_bounds(a, b)
+    bound = box_distance.lower_bounds(a, b)
     order = np.argsort(bound, axis=None)
     objects_a: dict[int, object] = {}
     objects_b: dict[int, object] = {}
@@ -61,7 +61,7 @@ def closest_pairs(a: Boxes, b: Boxes, within: float = 0.0) -> ClosePairs:
     fcl_values = np.array(proposed)
     check = fcl_values <= max(best + RECHECK, within + RECHECK)
     index, fcl_values = index[check], fcl_values[check]
-    exact, points = box_distance.distances(a.take(index[:, 0]), b.take(index[:, 1]))
+    exact, points = box_distance.pair_distances(a, b, index[:, 0], index[:, 1])
     apart = (exact > 0.0) & (fcl_values > 0.0)
     disagreement = float(np.abs(exact - fcl_values)[apart].max(initial=0.0))
     keep = (exact <= within) | (np.arange(len(exact)) == int(np.argmin(exact)))
@@ -72,7 +72,7 @@ def closest_pairs(a: Boxes, b: Boxes, within: float = 0.0) -> ClosePairs:
 def all_pairs(a: Boxes, b: Boxes) -> ClosePairs:
     """Every pair of bodies of a and b, in the order of the indices."""
     i, j = (grid.ravel() for grid in np.meshgrid(range(len(a)), range(len(b)), indexing="ij"))
-    exact, points = box_distance.distances(a.take(i), b.take(j))
+    exact, points = box_distance.pair_distances(a, b, i, j)
     return ClosePairs(np.stack([i, j], axis=1).astype(np.int64), exact, points, 0.0)
 
 
@@ -97,18 +97,3 @@ def _object(boxes: Boxes, k: int, made: dict[int, object]) -> object:
     if k not in made:
         made[k] = fcl_box(boxes.centers[k], boxes.rotations[k], boxes.half_extents[k])
     return made[k]
-
-
-def _lower_bounds(a: Boxes, b: Boxes) -> Array:
-    """(n, m) lower bounds of all distances [m]: the gap along the six face axes, at least."""
-    offset = b.centers[None] - a.centers[:, None]
-    R_ab = np.einsum("aji,bjk->abik", a.rotations, b.rotations)
-    size = np.abs(R_ab)
-    in_a = np.abs(np.einsum("aji,abj->abi", a.rotations, offset))
-    gap_a = in_a - a.half_extents[:, None] - np.einsum("abij,bj->abi", size, b.half_extents)
-    in_b = np.abs(np.einsum("bji,abj->abi", b.rotations, offset))
-    gap_b = in_b - b.half_extents[None] - np.einsum("abji,aj->abi", size, a.half_extents)
-    # Three orthogonal gaps of one box combine to a distance between its slab-hull and the other.
-    norm_a = np.linalg.norm(np.maximum(gap_a, 0.0), axis=2)
-    norm_b = np.linalg.norm(np.maximum(gap_b, 0.0), axis=2)
-    return np.asarray(np.maximum(norm_a, norm_b))

@@ -1,8 +1,9 @@
 """Where a machine's base must not stand, exact: its driving zone against a partner's bodies.
 
-Three variants: the machine as it is now, moved without turning; swinging freely in its posture; in
-any posture. And the zone while the heading turns. Polygons contain the true zone and exceed it by at
-most `tolerance`; distances are measured to them, so they err to the safe side by no more than that.
+Three variants: the machine as it is now, moved without turning; swinging freely in its posture;
+in any posture. And the zone while the heading turns. Polygons contain the true zone and exceed it
+by at most `tolerance` on an upright axis (see `driving_tilted`, `driving_turning` for the rest);
+distances are measured to them, so they err to the safe side.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import shapely
+from shapely.geometry.base import BaseGeometry
 
 from backend.cspace.driving_posture import moved, swept_arm
 from backend.cspace.driving_profile import Revolved, revolve
@@ -22,7 +24,7 @@ from backend.machine import kinematics
 from backend.machine.model import Machine
 from backend.spatial import transform
 from backend.spatial.boxes import Boxes
-from backend.spatial.types import Array
+from backend.spatial.types import Array, BoolArray
 
 TOLERANCE = 8e-4
 """How far a drawn zone may exceed the true one [m]."""
@@ -52,9 +54,9 @@ class DrivingZone:
     Geometries are shapely Polygons or MultiPolygons with holes [m], empty when nothing is in reach.
     """
 
-    as_is: shapely.Geometry
-    any_swing: shapely.Geometry
-    any_posture: shapely.Geometry
+    as_is: BaseGeometry
+    any_swing: BaseGeometry
+    any_posture: BaseGeometry
     exits: dict[str, Exit]  # "as_is", "any_swing", "any_posture": from the base's own position
 
     @property
@@ -86,9 +88,13 @@ def driving_zone(
     # Half of the tolerance for the radii of the solid, half for drawing its arcs.
     part = 0.5 * tolerance
     now = cover(slice_pieces(bodies, own))
-    swing = cover(joined_pieces([parked, _swinging(own_machine, own, own_q, tracks, T, bodies, part)]))
+    swing = cover(
+        joined_pieces([parked, _swinging(own_machine, own, own_q, tracks, T, bodies, part)])
+    )
     arm = swept_arm(own_machine, part)
-    posture = cover(joined_pieces([parked, _about(arm, T @ own_machine.arm.T_root_swing, bodies, part)]))
+    posture = cover(
+        joined_pieces([parked, _about(arm, T @ own_machine.arm.T_root_swing, bodies, part)])
+    )
     base = np.asarray(T_own_base, dtype=float)[:2, 3]
     zones = {"as_is": now, "any_swing": swing, "any_posture": posture}
     exits = {name: way_out(zone, np.zeros(2)) for name, zone in zones.items()}
@@ -104,7 +110,7 @@ def turning_zone(
     turn: tuple[float, float] = (0.0, 2.0 * np.pi),
     eta: float = 0.0,
     tolerance: float = TOLERANCE,
-) -> shapely.Geometry:
+) -> BaseGeometry:
     """The zone of the machine as it is while its heading turns on the spot about the base.
 
     turn: first and last heading relative to the present one [rad]; a full circle is exact to
@@ -124,7 +130,7 @@ def turning_zone(
     return shapely.transform(cover(pieces), lambda p: p + base)
 
 
-def way_out(zone: shapely.Geometry, point: Array) -> Exit:
+def way_out(zone: BaseGeometry, point: Array) -> Exit:
     """Signed distance and shortest way from a point (2,) to the edge of a zone."""
     if zone.is_empty:
         return Exit(float("inf"), np.array([1.0, 0.0]), 0.0)
@@ -138,7 +144,7 @@ def way_out(zone: shapely.Geometry, point: Array) -> Exit:
 
 
 def _swinging(
-    machine: Machine, own: Boxes, q: Array, tracks: Array, T: Array, bodies: Boxes, part: float
+    machine: Machine, own: Boxes, q: Array, tracks: BoolArray, T: Array, bodies: Boxes, part: float
 ) -> Pieces:
     """The bodies above the swing joint, swung over their limits, or all the way round."""
     T_site_swing = T @ machine.arm.T_root_swing
@@ -170,7 +176,9 @@ def _local(T_own_base: Array, partner_boxes: Boxes, eta: float) -> tuple[Array, 
     T = np.array(T_own_base, dtype=float)
     base = T[:3, 3].copy()
     T[:3, 3] = 0.0
-    bodies = Boxes(partner_boxes.centers - base, partner_boxes.rotations, partner_boxes.half_extents)
+    bodies = Boxes(
+        partner_boxes.centers - base, partner_boxes.rotations, partner_boxes.half_extents
+    )
     return T, bodies.inflated(eta) if eta > 0.0 else bodies
 
 

@@ -8,10 +8,12 @@ stick, then with the boom. The result depends on the description only and is kep
 from __future__ import annotations
 
 from functools import lru_cache
+from itertools import pairwise
 
 import numpy as np
 import shapely
 from shapely.geometry import Polygon
+from shapely.geometry.base import BaseGeometry
 
 from backend.cspace.driving_profile import Revolved, joined, make_runs, revolve, subdivide
 from backend.machine import kinematics
@@ -50,7 +52,6 @@ def _swept(key: _Same, tolerance: float) -> Revolved:
         [0.0 if j.continuous else float(np.clip(0.0, j.lower, j.upper)) for j in machine.joints]
     )
     T_root_links = kinematics.link_poses(machine, q)
-    swing = next(i for i, link in enumerate(machine.links) if link.joint == 0)
     boxes = kinematics.body_boxes(machine, T_root_links)
     parts = np.array([machine.part_of_body(b) for b in range(len(boxes))])
     T_swing_root = transform.inverse(swing_frame(machine))
@@ -61,7 +62,9 @@ def _swept(key: _Same, tolerance: float) -> Revolved:
     normal = normal - np.array([0.0, 0.0, normal[2]])
     normal /= np.linalg.norm(normal)
     forward = np.cross(normal, [0.0, 0.0, 1.0])
-    T_plane_root = transform.make(np.stack([forward, normal, [0, 0, 1]]), np.zeros(3)) @ T_swing_root
+    T_plane_root = (
+        transform.make(np.stack([forward, normal, [0, 0, 1]]), np.zeros(3)) @ T_swing_root
+    )
     pivots, turns = [], []
     for k in (3, 2, 1):
         i = next(i for i, link in enumerate(machine.links) if link.joint == k)
@@ -83,11 +86,10 @@ def _swept(key: _Same, tolerance: float) -> Revolved:
         slabs.setdefault((round(left, 6), round(right, 6), first), []).append(outline)
     profiles = []
     for (left, right, first), outlines in slabs.items():
-        region = shapely.union_all(outlines)
+        region: BaseGeometry = shapely.union_all(outlines)
         for k in range(first, 3):
             region = sweep(region, pivots[k], *turns[k], tolerance / 9.0)
         profiles.append(_revolved_slab(region, left - 1e-6, right + 1e-6, 0.25 * tolerance))
-    assert swing >= 0
     solids.append(runs_of(shapely.union_all(profiles), 0.5 * tolerance))
     return joined(solids)
 
@@ -99,9 +101,7 @@ def swing_frame(machine: Machine) -> Array:
 
 def moved(boxes: Boxes, T: Array) -> Boxes:
     """The boxes mapped by T (4, 4)."""
-    return Boxes(
-        transform.apply(T, boxes.centers), T[:3, :3] @ boxes.rotations, boxes.half_extents
-    )
+    return Boxes(transform.apply(T, boxes.centers), T[:3, :3] @ boxes.rotations, boxes.half_extents)
 
 
 def _side_view(
@@ -121,7 +121,9 @@ def _side_view(
             top = i
             pivot = transform.apply(T_plane_root, T_root_links[i, None, :3, 3])[0]
             reach = float(np.linalg.norm(here - pivot, axis=1).max())
-            radius = max(reach, radius + float(np.linalg.norm(here[0] - pivot)) if radius else reach)
+            radius = max(
+                reach, radius + float(np.linalg.norm(here[0] - pivot)) if radius else reach
+            )
             here = np.array([pivot])
         i = machine.links[i].parent
     if top < 0:
@@ -136,9 +138,9 @@ def _side_view(
 
 
 def sweep(
-    region: shapely.Geometry, pivot: Array, begin: float, turn: float, tolerance: float
-) -> shapely.Geometry:
-    """What a plane region covers when it turns about `pivot` (2,) from `begin` by `turn` >= 0 [rad].
+    region: BaseGeometry, pivot: Array, begin: float, turn: float, tolerance: float
+) -> BaseGeometry:
+    """What a plane region covers turning about `pivot` (2,) from `begin` by `turn` >= 0 [rad].
 
     In polar coordinates a turn is a shift of the angle. The boundary is split where its distance
     from the pivot has an extremum; the part between covers the strip between its first and last
@@ -155,7 +157,7 @@ def sweep(
     return shapely.union_all(shapely.make_valid(np.array(pieces, dtype=object)))
 
 
-def _turned(region: shapely.Geometry, pivot: Array, angle: float) -> shapely.Geometry:
+def _turned(region: BaseGeometry, pivot: Array, angle: float) -> BaseGeometry:
     c, s = np.cos(angle), np.sin(angle)
     return shapely.transform(region, lambda p: (p - pivot) @ np.array([[c, s], [-s, c]]) + pivot)
 
@@ -200,15 +202,17 @@ def _strip(chain: Array, begin: float, turn: float, tolerance: float, pivot: Arr
         else:
             angles, grow = begin + np.arange(1, n) * turn / n, 1.0
         direction = np.arctan2(point[1], point[0]) + angles
-        return radius * grow * np.stack([np.cos(direction), np.sin(direction)], axis=1)
+        return np.asarray(radius * grow * np.stack([np.cos(direction), np.sin(direction)], axis=1))
 
     ring = [at(chain, begin), arc(chain[-1], True), at(chain[::-1], begin + turn)]
     ring.append(arc(chain[0], False)[::-1])
     return Polygon(np.concatenate(ring) + pivot)
 
 
-def _revolved_slab(region: shapely.Geometry, left: float, right: float, tolerance: float) -> Polygon:
-    """(r, z) profile of a plane region (x, z) with y from left to right, turned about the z axis."""
+def _revolved_slab(
+    region: BaseGeometry, left: float, right: float, tolerance: float
+) -> BaseGeometry:
+    """(r, z) profile of a region (x, z) with y from left to right, turned about the z axis."""
     far, near = max(abs(left), abs(right)), max(left, -right, 0.0)
     low, high, a, b = trapezoids(region)
 
@@ -225,7 +229,7 @@ def _revolved_slab(region: shapely.Geometry, left: float, right: float, toleranc
     return shapely.union_all(shapely.polygons(np.stack([r, z], axis=2)))
 
 
-def trapezoids(region: shapely.Geometry) -> tuple[Array, Array, Array, Array]:
+def trapezoids(region: BaseGeometry) -> tuple[Array, Array, Array, Array]:
     """A plane region cut at the heights of its vertices: low, high (n,), left and right (n, 2).
 
     left, right: abscissas at the lower and upper end of each trapezoid.
@@ -235,7 +239,7 @@ def trapezoids(region: shapely.Geometry) -> tuple[Array, Array, Array, Array]:
     levels = levels[np.append(True, np.diff(levels) > 1e-10)]
     p1, q1 = np.minimum(p[:, 1], q[:, 1]), np.maximum(p[:, 1], q[:, 1])
     columns: list[list[Array]] = [[], [], [], []]
-    for low, high in zip(levels[:-1], levels[1:], strict=True):
+    for low, high in pairwise(levels):
         middle = 0.5 * (low + high)
         crossing = (p1 < middle) & (q1 > middle)
         a, d = p[crossing], (q - p)[crossing]
@@ -253,7 +257,7 @@ def trapezoids(region: shapely.Geometry) -> tuple[Array, Array, Array, Array]:
     return low, high, left, right
 
 
-def _edges(region: shapely.Geometry) -> tuple[Array, Array]:
+def _edges(region: BaseGeometry) -> tuple[Array, Array]:
     """Ends p, q (n, 2) of all edges of a region's rings."""
     starts, stops = [], []
     for polygon in getattr(region, "geoms", [region]):
@@ -264,7 +268,7 @@ def _edges(region: shapely.Geometry) -> tuple[Array, Array]:
     return np.concatenate(starts), np.concatenate(stops)
 
 
-def runs_of(profile: shapely.Geometry, tolerance: float) -> Revolved:
+def runs_of(profile: BaseGeometry, tolerance: float) -> Revolved:
     """A profile in (r, z) as runs; radii grow by at most `tolerance` [m]."""
     low, high, left, right = trapezoids(profile)
     runs = []

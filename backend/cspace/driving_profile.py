@@ -9,7 +9,9 @@ the inner one from below. Radii are never too small outside nor too large inside
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 
@@ -24,6 +26,9 @@ EDGES: IntArray = np.array(
 _THIN = 1e-5
 """Flat boxes get this half thickness [m]: a region without area would vanish from a union."""
 _SPLITS = 24
+
+Radii: TypeAlias = Callable[[IntArray, Array], tuple[Array, Array]]
+"""(bands, heights) -> inner and outer radius [m]."""
 
 
 @dataclass(frozen=True)
@@ -110,7 +115,7 @@ def revolve(boxes: Boxes, tolerance: float) -> Revolved:
 
 
 @dataclass(frozen=True)
-class Pieces:
+class Bands:
     """Bands low..high (n,) [m] of the band index[k]; inner, outer: (n, 2) radii at both ends."""
 
     index: IntArray
@@ -120,7 +125,7 @@ class Pieces:
     outer: Array
 
 
-def subdivide(low: Array, high: Array, radii, tolerance: float) -> Pieces:  # type: ignore[no-untyped-def]
+def subdivide(low: Array, high: Array, radii: Radii, tolerance: float) -> Bands:
     """Bands halved until linear radii are within `tolerance` of the true ones.
 
     low, high: (n,) [m]; radii(index, z) -> (inner, outer) at heights z of bands `index`, both
@@ -151,12 +156,12 @@ def subdivide(low: Array, high: Array, radii, tolerance: float) -> Pieces:  # ty
             np.concatenate([low[rest], middle[rest]]),
             np.concatenate([middle[rest], high[rest]]),
         )
-    columns = [np.concatenate(c) for c in zip(*done, strict=True)]
-    return Pieces(columns[0].astype(np.int64), *columns[1:])
+    index, low, high, inner, outer = (np.concatenate(c) for c in zip(*done, strict=True))
+    return Bands(index.astype(np.int64), low, high, inner, outer)
 
 
 def make_runs(low: Array, high: Array, inner: Array, outer: Array, tolerance: float) -> Revolved:
-    """Stacked bands (n,) with radii (n, 2) at their ends, gathered into runs of concave outer radius.
+    """Stacked bands (n,) with radii (n, 2) at their ends, as runs of concave outer radius.
 
     Bands must follow each other in height. Where the concave hull of the outer radii would exceed
     them by more than `tolerance` [m], a new run begins.
@@ -187,7 +192,8 @@ def make_runs(low: Array, high: Array, inner: Array, outer: Array, tolerance: fl
         outs.append(run[2])
         ends.append(ends[-1] + len(run[0]))
         i = fits
-    return Revolved(*(np.concatenate(v) for v in (zs, ins, outs)), np.array(ends))
+    z, inner, outer = (np.concatenate(v) for v in (zs, ins, outs))
+    return Revolved(z, inner, outer, np.array(ends, dtype=np.int64))
 
 
 def _thinned(z: Array, inner: Array, outer: Array, tolerance: float) -> tuple[Array, Array, Array]:

@@ -1,10 +1,11 @@
 """Where a solid of revolution with an upright axis, driven without turning, meets convex bodies.
 
-Cut a body at the heights of a run. The outer edge of the zone is the union of disks about all points
-of the cut body, each of the solid's radius at that height; the radius is concave in height, so the
-union is the convex hull of the disks about the cut body's vertices. The body is clear inside the
-solid (between it and the axis) if all its points are nearer than the inner radius: the intersection
-of disks about the same vertices is a hole. Arcs are drawn as tangents outside, as chords in holes.
+Cut a body at the heights of a run. The outer edge of the zone is the union of disks about all
+points of the cut body, each of the solid's radius at that height; the radius is concave in height,
+so the union is the convex hull of the disks about the cut body's vertices. The body is clear inside
+the solid (between it and the axis) if all its points are nearer than the inner radius: the
+intersection of disks about the same vertices is a hole.
+Arcs are drawn as tangents outside, as chords in holes.
 """
 
 from __future__ import annotations
@@ -176,7 +177,7 @@ def _meet(c: Array, s: Array, limit: Array, i: int, j: int, out: Array) -> bool:
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _needed(disks: Array, n: int) -> int:
-    """Drops disks that lie in another one outside and need no less than it inside; how many stay."""
+    """Drops disks that lie in another one outside and need no less inside; how many stay."""
     m = 0
     for k in range(n):
         covered = False

@@ -3,9 +3,9 @@
 For a body a and a convex run k the zone is the slice at height 0 of the Minkowski difference a - k.
 Its support in a horizontal direction u is min over b of h(u cos b + z sin b) / cos b, h being the
 support of the difference (the dual of maximising u over the slice), and every b gives a line that
-bounds the zone from outside. Lines are added where the polygon still exceeds the chord of two points
-of the zone by more than the tolerance. Cavities around the axis are filled: never unsafe, and too
-large where a body would hang inside one.
+bounds the zone from outside. Lines are added where the polygon still exceeds the chord of two
+points of the zone by more than the tolerance. Cavities around the axis are filled: never unsafe,
+and too large where a body would hang inside one.
 """
 
 from __future__ import annotations
@@ -47,26 +47,38 @@ def _extreme(
 ) -> float:
     """The farthest point of a - k in direction w (3,), into out (3,); its distance along w."""
     along = -(w[0] * k[0] + w[1] * k[1] + w[2] * k[2])
-    across = -w - along * k
-    length = np.sqrt((across * across).sum())
-    best, at = -np.inf, 0
-    for e in range(len(z)):
-        value = along * z[e] + length * r[e]
-        if value > best:
-            best, at = value, e
-    out[:] = c - o - z[at] * k
-    if length > 1e-14:
-        out -= r[at] / length * across
+    x, y, v = -w[0] - along * k[0], -w[1] - along * k[1], -w[2] - along * k[2]
+    length = np.sqrt(x * x + y * y + v * v)
+    # The radius is concave in height: along z + length r rises up to its maximum, then falls.
+    at, last = 0, len(z) - 1
+    while at < last:
+        middle = (at + last) // 2
+        if along * (z[middle + 1] - z[middle]) + length * (r[middle + 1] - r[middle]) > 0.0:
+            at = middle + 1
+        else:
+            last = middle
+    total = along * z[at] + length * r[at]
+    # Near the axis the difference is rounding: only its part across the axis is a direction.
+    extra = x * k[0] + y * k[1] + v * k[2]
+    x, y, v = x - extra * k[0], y - extra * k[1], v - extra * k[2]
+    norm = np.sqrt(x * x + y * y + v * v)
+    scale = r[at] / norm if norm > 1e-15 else 0.0
+    out[0] = c[0] - o[0] - z[at] * k[0] - scale * x
+    out[1] = c[1] - o[1] - z[at] * k[1] - scale * y
+    out[2] = c[2] - o[2] - z[at] * k[2] - scale * v
     for i in range(3):
+        total += (c[i] - o[i]) * w[i]
         side = w[0] * R[0, i] + w[1] * R[1, i] + w[2] * R[2, i]
-        out += (h[i] if side >= 0.0 else -h[i]) * R[:, i]
-    return float((w * out).sum())
+        step = h[i] if side >= 0.0 else -h[i]
+        total += step * side
+        out[0] += step * R[0, i]
+        out[1] += step * R[1, i]
+        out[2] += step * R[2, i]
+    return float(total)
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _line(
-    c: Array, R: Array, h: Array, o: Array, k: Array, z: Array, r: Array, row: Array
-) -> None:
+def _line(c: Array, R: Array, h: Array, o: Array, k: Array, z: Array, r: Array, row: Array) -> None:
     """For the direction row[:2]: the bound of the zone into row[2], a point of it into row[3:5]."""
     low, high = -0.5 * np.pi + 1e-6, 0.5 * np.pi - 1e-6
     w, p = np.empty(3), np.empty(3)

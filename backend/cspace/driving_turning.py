@@ -1,8 +1,8 @@
 """Driving zone while a machine turns through less than a full circle about an upright axis.
 
 For headings phi - h and phi + h every point of the machine stays within r (1 - cos h) of the chord
-between its two positions, so each pair's slice in between lies in the convex hull of the two slices,
-grown by that much.
+between its two positions, so each pair's slice in between lies in the convex hull of the two
+slices, grown by that much.
 """
 
 from __future__ import annotations
@@ -58,7 +58,9 @@ def _hulls(before: _Slices, after: _Slices) -> list[Array]:
     # for slices without area, which rounding may drop.
     hulls = []
     for pair in before[2].keys() | after[2].keys():
-        both = [s[0][s[1][s[2][pair]] : s[1][s[2][pair] + 1]] for s in (before, after) if pair in s[2]]
+        both = [
+            s[0][s[1][s[2][pair]] : s[1][s[2][pair] + 1]] for s in (before, after) if pair in s[2]
+        ]
         points = np.ascontiguousarray(np.concatenate(both))
         out = np.empty((2 * MOST + 2, 2))
         n = _hull(points, out)

@@ -6,7 +6,10 @@ the root frame, so that a sloping base costs nothing. Images are bits, packed al
 
 from __future__ import annotations
 
+import os
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -21,6 +24,10 @@ from backend.spatial.boxes import Boxes
 from backend.spatial.types import AnyArray, Array, BoolArray, IntArray, frozen
 
 __all__ = ["EXACT", "INNER", "OUTER", "ArmModel", "JointGrid", "arm_model", "blocked", "joint_grid"]
+
+
+_CHUNKS = 12
+"""Pieces of an image that the threads share: enough to even out dear and cheap swings."""
 
 
 @dataclass(frozen=True)
@@ -214,7 +221,7 @@ def _image(
     ]
     halves = np.zeros(4) if kind == EXACT else grid.steps / 2.0
     body: Profiles = model.arm.inner if kind == INNER else model.arm.outer
-    image_kernel(
+    arguments = (
         model.chain,
         body,
         (obstacles.centers.copy(), obstacles.rotations.copy(), obstacles.half_extents.copy()),
@@ -222,9 +229,19 @@ def _image(
         T_arm_root,
         Cells(rows[0], rows[1], rows[2], kind, halves),
         base,
-        out,
     )
+    cuts = np.linspace(0, grid.shape[0], min(grid.shape[0], _CHUNKS) + 1).astype(int)
+    spans = list(zip(cuts[:-1].tolist(), cuts[1:].tolist(), strict=True))
+    if len(spans) < _CHUNKS:
+        image_kernel(*arguments, 0, grid.shape[0], out)
+    else:
+        list(_pool().map(lambda span: image_kernel(*arguments, *span, out), spans))
     return out
+
+
+@lru_cache(maxsize=1)
+def _pool() -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(os.cpu_count() or 1, thread_name_prefix="cspace")
 
 
 def _step(grid: JointGrid, joint: int) -> float:

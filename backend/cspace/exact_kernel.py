@@ -11,7 +11,7 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 
 from backend.cspace.exact_boxes import gap
 from backend.cspace.planar_arm import Profiles
@@ -22,6 +22,8 @@ from backend.spatial.types import AnyArray, Array, BoolArray, IntArray
 EXACT, OUTER, INNER = 0, 1, -1
 ROUNDING = 1e-9
 """[m], [rad]: certified bounds are moved outward by more than the kernels round."""
+
+_BLOCK = 8  # stick cells that are asked about together first
 
 
 class Chain(NamedTuple):
@@ -193,10 +195,11 @@ def _row(
     turn: float,
     kind: int,
     full: AnyArray,
+    work: Array,
     scratch: AnyArray,
     out: AnyArray,
 ) -> None:
-    """Set the bits of `out` that the chosen pairs block. scratch: (3, words)."""
+    """Set the bits of `out` that the chosen pairs block. work, scratch (3, words): see `touched`."""
     askew = False
     for i in range(len(chosen)):
         b, p = chosen[i, 0], chosen[i, 1]
@@ -207,7 +210,7 @@ def _row(
         if rectangle_distance(polygons.low[p], polygons.high[p], px, pz) > within * within:
             continue
         touched(
-            body, b, polygons, p, px, pz, row, margin, turn, scratch[0], scratch[1], out
+            body, b, polygons, p, px, pz, row, margin, turn, work, scratch, out
         )  # fmt: skip
         done = True
         for w in range(len(out)):
@@ -226,7 +229,7 @@ def _row(
             continue
         maybe = scratch[2]
         maybe[:] = 0
-        touched(body, b, polygons, p, px, pz, row, 0.0, 0.0, scratch[0], scratch[1], maybe)
+        touched(body, b, polygons, p, px, pz, row, 0.0, 0.0, work, scratch, maybe)
         for w in range(len(out)):
             rest = maybe[w] & full[w] & ~out[w]
             for bit in range(64):
@@ -321,14 +324,16 @@ def _swing_block(
     pad = ROUNDING if kind != EXACT else 0.0
 
     full1, full2, full3 = _full(cells.boom.n), _full(cells.stick.n), _full(cells.bucket.n)
+    work = np.empty((3, polygons.x.shape[1]))
     scratch1 = np.empty((3, len(full1)), np.uint64)
     scratch2 = np.empty((3, len(full2)), np.uint64)
     scratch3 = np.empty((3, len(full3)), np.uint64)
     blocked1, blocked2 = np.zeros(len(full1), np.uint64), np.zeros(len(full2), np.uint64)
+    needed, count = np.empty((len(bucket_pairs), 2), np.int64), 0
     px, pz = chain.pivot[0], chain.pivot[1]
     _row(
         boom_pairs, chain, 0, body, polygons, boxes, px, pz, cells.boom,
-        sign * pad, sign * (turn_boom + pad), kind, full1, scratch1, blocked1,
+        sign * pad, sign * (turn_boom + pad), kind, full1, work, scratch1, blocked1,
     )  # fmt: skip
     for i in range(cells.boom.n):
         if (blocked1[i // 64] >> np.uint64(i % 64)) & np.uint64(1):
@@ -344,15 +349,31 @@ def _swing_block(
         blocked2[:] = 0
         _row(
             stick_pairs, chain, 1, body, polygons, boxes, qx, qz, row2,
-            sign * margin, sign * (turn_stick + pad), kind, full2, scratch2, blocked2,
+            sign * margin, sign * (turn_stick + pad), kind, full2, work, scratch2, blocked2,
         )  # fmt: skip
         most = l2 + (l1 + 2.0 * l2) * turn_boom + l2 * cells.halves[2] + pad
         near = _near(bucket_pairs, body, polygons, qx, qz, most)
+        count = 0
         for k in range(cells.stick.n):
+            if k % _BLOCK == 0 and len(near) > 0:
+                # What is free of a pair for a whole block of stick cells need not be asked again.
+                size = min(_BLOCK, cells.stick.n - k)
+                angle2 = row2.start + (k + 0.5 * (size - 1)) * row2.step
+                span = 0.5 * (size - 1) * abs(row2.step)
+                c, s = math.cos(angle2), math.sin(angle2)
+                rx = qx + c * chain.stick[0] - s * chain.stick[1]
+                rz = qz + s * chain.stick[0] + c * chain.stick[1]
+                moved = l2 * (cells.halves[2] + span)
+                lever = math.hypot(rx - px, rz - pz) + moved
+                row3 = Row(cells.bucket.start + angle2, cells.bucket.step, cells.bucket.n)
+                count = _needed(
+                    near, body, polygons, rx, rz, row3, lever * turn_boom + moved + ROUNDING,
+                    turn_bucket + span + ROUNDING, full3, work, scratch3, needed,
+                )  # fmt: skip
             if (blocked2[k // 64] >> np.uint64(k % 64)) & np.uint64(1):
                 out[i, k, :] = full3
                 continue
-            if len(near) == 0:
+            if count == 0:
                 continue
             angle2 = row2.start + k * row2.step
             c, s = math.cos(angle2), math.sin(angle2)
@@ -363,12 +384,46 @@ def _swing_block(
             margin = lever * turn_boom + l2 * cells.halves[2] + pad
             row3 = Row(cells.bucket.start + angle2, cells.bucket.step, cells.bucket.n)
             _row(
-                near, chain, 2, body, polygons, boxes, rx, rz, row3,
-                sign * margin, sign * (turn_bucket + pad), kind, full3, scratch3, out[i, k],
+                needed[:count], chain, 2, body, polygons, boxes, rx, rz, row3,
+                sign * margin, sign * (turn_bucket + pad), kind, full3, work, scratch3, out[i, k],
             )  # fmt: skip
 
 
-@njit(cache=True, nogil=True, parallel=True)  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _needed(
+    chosen: IntArray,
+    body: Profiles,
+    polygons: Polygons,
+    px: float,
+    pz: float,
+    row: Row,
+    margin: float,
+    turn: float,
+    full: AnyArray,
+    work: Array,
+    scratch: AnyArray,
+    out: IntArray,
+) -> int:
+    """The chosen pairs that are not free in all cells of a row within margin and turn; how many."""
+    count = 0
+    maybe = scratch[2]
+    for i in range(len(chosen)):
+        b, p = chosen[i, 0], chosen[i, 1]
+        within = body.reach[b] + margin
+        if rectangle_distance(polygons.low[p], polygons.high[p], px, pz) > within * within:
+            continue
+        maybe[:] = 0
+        touched(body, b, polygons, p, px, pz, row, margin, turn, work, scratch, maybe)
+        some = False
+        for w in range(len(full)):
+            some = some or (maybe[w] & full[w]) != 0
+        if some:
+            out[count, 0], out[count, 1] = b, p
+            count += 1
+    return count
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def image_kernel(
     chain: Chain,
     body: Profiles,
@@ -377,16 +432,19 @@ def image_kernel(
     T_arm_root: Array,
     cells: Cells,
     base: BoolArray,
+    first: int,
+    last: int,
     out: AnyArray,
 ) -> None:
-    """Fill out (swing, boom, stick, words), which must be 0, with the blocked cells.
+    """Fill swings first..last-1 of out (swing, boom, stick, words), which must be 0, with the
+    blocked cells. Without the GIL, so that threads can share the swings.
 
     boxes: obstacles in the root frame, centers (m, 3), rotations (m, 3, 3), halves (m, 3); pairs:
     (n, m) which body must not touch which obstacle; T_arm_root: (swing, 3, 4); base: (swing,)
     where everything is blocked.
     """
     full = _full(cells.bucket.n)
-    for s in prange(out.shape[0]):
+    for s in range(first, last):
         if base[s]:
             for i in range(out.shape[1]):
                 for k in range(out.shape[2]):

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 from numba import njit
+from shapely.geometry.base import BaseGeometry
 
 from backend.spatial.boxes import Boxes
 from backend.spatial.types import Array, BoolArray, IntArray
@@ -30,10 +31,11 @@ def box_slices(a: Boxes, b: Boxes) -> tuple[Array, IntArray, IntArray]:
     the other, counter-clockwise, where each begins and the last ends (p + 1,), and the pair (p, 2)
     of indices of each. Pairs that miss each other in height have no polygon. Exact up to rounding.
     """
-    return _box_slices(
+    points, start, index = _box_slices(
         *(np.ascontiguousarray(v) for v in (a.centers, a.rotations, a.half_extents)),
         *(np.ascontiguousarray(v) for v in (b.centers, b.rotations, b.half_extents)),
     )
+    return points, start, index
 
 
 def polygons(points: Array, start: IntArray) -> list[shapely.Polygon]:
@@ -41,10 +43,13 @@ def polygons(points: Array, start: IntArray) -> list[shapely.Polygon]:
     ring = np.repeat(np.arange(len(start) - 1), np.diff(start))
     if len(ring) == 0:
         return []
-    return list(shapely.polygons(shapely.linearrings(points, indices=ring)))
+    made: list[shapely.Polygon] = np.asarray(
+        shapely.polygons(shapely.linearrings(points, indices=ring))
+    ).tolist()
+    return made
 
 
-def union(pieces: list[shapely.Polygon]) -> shapely.Geometry:
+def union(pieces: list[shapely.Polygon]) -> BaseGeometry:
     """The union as a Polygon or MultiPolygon; an empty Polygon for no pieces."""
     return shapely.union_all(pieces) if pieces else shapely.Polygon()
 
@@ -84,7 +89,7 @@ def joined_pieces(parts: list[Pieces]) -> Pieces:
     )
 
 
-def cover(pieces: Pieces) -> shapely.Geometry:
+def cover(pieces: Pieces) -> BaseGeometry:
     """The union of all pieces.
 
     Few outlines matter, those that lie in no other one. A free place within their union lies in
@@ -108,8 +113,12 @@ def cover(pieces: Pieces) -> shapely.Geometry:
             return outline
         if not shapely.intersects(every[k], free):
             continue
-        free = shapely.difference(free, every[k]) if not has[k] else shapely.union(
-            shapely.difference(free, every[k]), shapely.intersection(free, hole[k])
+        free = (
+            shapely.difference(free, every[k])
+            if not has[k]
+            else shapely.union(
+                shapely.difference(free, every[k]), shapely.intersection(free, hole[k])
+            )
         )
     parts = [g for g in shapely.get_parts(free) if g.geom_type == "Polygon" and g.area > _SPECK]
     return shapely.difference(outline, union(parts)) if parts else outline
@@ -141,11 +150,7 @@ def convex_hull(points: Array, n: int, out: Array) -> int:
     # Equal x need the order of y: points of one x stand together after the sort.
     for i in range(1, n):
         k, j = order[i], i - 1
-        while (
-            j >= 0
-            and points[order[j], 0] == points[k, 0]
-            and points[order[j], 1] > points[k, 1]
-        ):
+        while j >= 0 and points[order[j], 0] == points[k, 0] and points[order[j], 1] > points[k, 1]:
             order[j + 1] = order[j]
             j -= 1
         order[j + 1] = k
@@ -212,9 +217,7 @@ def _box_slices(
                         crossing[n + 1] = vertex[w, :2]
                         n += 2
                     else:
-                        crossing[n] = vertex[v, :2] + z / (z - up) * (
-                            vertex[w, :2] - vertex[v, :2]
-                        )
+                        crossing[n] = vertex[v, :2] + z / (z - up) * (vertex[w, :2] - vertex[v, :2])
                         n += 1
             size = convex_hull(crossing, n, points[start[made] :])
             if size:
@@ -226,7 +229,7 @@ def _box_slices(
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _inside(points: Array, first: int, last: int, x: float, y: float) -> bool:
-    """Whether (x, y) lies in the convex polygon points[first:last], found in its fan of triangles."""
+    """Whether (x, y) lies in the convex polygon points[first:last]: bisection of its fan."""
     ox, oy = points[first, 0], points[first, 1]
     dx, dy = x - ox, y - oy
     low, high = first + 1, last - 1

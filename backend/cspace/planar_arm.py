@@ -23,7 +23,8 @@ from backend.spatial import rotation, transform
 from backend.spatial.boxes import Boxes
 from backend.spatial.types import Array, BoolArray, IntArray
 
-PLANAR = 1e-7  # [m], [rad] off the plane at most
+PARALLEL = 1e-6  # [rad] joint axes off the plane's normal at most
+ALIGNED = 1e-9  # [rad] a box more askew than this is not taken for a prism
 GROUPS = ("boom", "stick", "bucket")
 
 
@@ -101,8 +102,9 @@ def planar_arm(machine: Machine, rest: Array | None = None, inflation: float = 0
     forward = np.cos(azimuth) * machine.arm.T_root_swing[:3, 0]
     forward = forward + np.sin(azimuth) * machine.arm.T_root_swing[:3, 1]
     left = axes[1] * np.sign(axes[1] @ np.cross(z, forward))
-    off = [1.0 - abs(axes[0] @ z), abs(left @ z), *(1.0 - np.abs(axes[1:] @ left))]
-    if max(off) > PLANAR:
+    off = [np.linalg.norm(np.cross(axes[0], z)), abs(left @ z)]
+    off += [np.linalg.norm(np.cross(axis, left)) for axis in axes[1:]]
+    if max(off) > PARALLEL:
         raise ValueError(f"{machine.name}: the axes of boom, stick and bucket are not parallel")
     left = left - (left @ z) * z
     left = left / np.linalg.norm(left)
@@ -121,9 +123,10 @@ def planar_arm(machine: Machine, rest: Array | None = None, inflation: float = 0
         T[:, :3, :3] @ own.rotations,
         own.half_extents,
     )
-    aligned = np.abs(boxes.rotations[:, 1, :]).max(axis=1) > 1.0 - 0.5 * PLANAR**2
-    outer = [_outer(boxes, i) for i in range(len(boxes))]
-    inner = [outer[i] if aligned[i] else _inner(boxes, i) for i in range(len(boxes))]
+    # The two smaller lateral components are the sines of how far the box is askew.
+    aligned = np.sort(np.abs(boxes.rotations[:, 1, :]), axis=1)[:, 1] < ALIGNED
+    outer = [outer_prism(boxes, i) for i in range(len(boxes))]
+    inner = [outer[i] if aligned[i] else inner_prism(boxes, i) for i in range(len(boxes))]
     return PlanarArm(
         T_root_arm=T_root_arm,
         swing_sign=float(np.sign(axes[0] @ z)),
@@ -140,14 +143,14 @@ def planar_arm(machine: Machine, rest: Array | None = None, inflation: float = 0
     )
 
 
-def _outer(boxes: Boxes, i: int) -> tuple[Array, Array]:
+def outer_prism(boxes: Boxes, i: int) -> tuple[Array, Array]:
     """Profile (v, 2) counter-clockwise and slab (2,) of the smallest prism around box i."""
     corners = boxes.take(np.array([i])).corners()[0]
     slab = np.array([corners[:, 1].min(), corners[:, 1].max()])
     return hull(corners[:, [0, 2]]), slab
 
 
-def _inner(boxes: Boxes, i: int) -> tuple[Array, Array]:
+def inner_prism(boxes: Boxes, i: int) -> tuple[Array, Array]:
     """Profile and slab of a prism inside box i, (0, 2) when there is none."""
     R, half = boxes.rotations[i], boxes.half_extents[i]
     across = int(np.argmax(np.abs(R[1])))

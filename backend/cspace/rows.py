@@ -22,6 +22,7 @@ import numpy as np
 from numba import njit
 
 from backend.cspace.planar_arm import Profiles
+from backend.cspace.rows_angles import ERROR, arc_cosine, bearing
 from backend.spatial.types import AnyArray, Array, IntArray
 
 ALL = np.uint64(0xFFFFFFFFFFFFFFFF)
@@ -63,20 +64,34 @@ def _range_word(first: int, last: int, word: int) -> np.uint64:
     return (ALL << np.uint64(low)) & (ALL >> np.uint64(63 - high))
 
 
-@njit(cache=True, nogil=True, inline="always")  # type: ignore[untyped-decorator]
-def _keep_arc(center: float, half: float, row: Row, mask: AnyArray) -> None:
-    """Clear the cells of mask that are not within `half` of `center` [rad], on the circle."""
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _arc(center: float, half: float, row: Row, keep: bool, exact: bool, mask: AnyArray) -> bool:
+    """The cells of the row within `half` of `center` [rad], on the circle: with `keep` clear all
+    others in mask, else set these. False when an end is too near to a cell to tell on which side.
+    """
     inverse = 1.0 / row.step
     period = abs(2.0 * math.pi * inverse)
     middle = 0.5 * (row.n - 1)
     c = (center - row.start) * inverse
     c -= period * math.floor((c - middle) / period + 0.5)
     h = half * abs(inverse)
-    first, last = math.floor(c - h) + 1, math.ceil(c + h) - 1
+    low, high = c - h, c + h
     c += -period if c > middle else period
-    again_first, again_last = math.floor(c - h) + 1, math.ceil(c + h) - 1
+    again_low, again_high = c - h, c + h
+    if not exact:
+        close = ERROR * abs(inverse)
+        for end in (low, high, again_low, again_high):
+            if abs(end - math.floor(end + 0.5)) < close and -1.0 < end < row.n:
+                return False
+    first, last = math.floor(low) + 1, math.ceil(high) - 1
+    again_first, again_last = math.floor(again_low) + 1, math.ceil(again_high) - 1
     for w in range(len(mask)):
-        mask[w] &= _range_word(first, last, w) | _range_word(again_first, again_last, w)
+        word = _range_word(first, last, w) | _range_word(again_first, again_last, w)
+        if keep:
+            mask[w] &= word
+        else:
+            mask[w] |= word
+    return True
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
@@ -90,65 +105,116 @@ def touched(
     row: Row,
     margin: float,
     turn: float,
-    free: AnyArray,
-    mask: AnyArray,
+    work: Array,
+    words: AnyArray,
     out: AnyArray,
 ) -> None:
     """Set the bits of `out` where body b with its pivot at (px, pz) is not apart from polygon k.
 
-    free, mask: scratch words, as many as out.
+    Scratch: work (3, corners of the largest polygon); words (2 or more, words of out).
     """
-    words = len(out)
+    edges = polygons.count[k]
+    inside = body.depth[b] <= 0.0
+    for i in range(edges):
+        c = polygons.offset[k, i] - polygons.normal_x[k, i] * px - polygons.normal_z[k, i] * pz
+        c += margin
+        if c < -body.reach[b]:
+            return
+        work[0, i] = c
+        inside = inside and c >= 0.0
+    if inside:  # the pivot lies in both
+        out[:] = ALL
+        return
+    free, mask = words[0], words[1]
+    if not _free(body, b, polygons, k, px, pz, row, margin, turn, False, work, free, mask):
+        _free(body, b, polygons, k, px, pz, row, margin, turn, True, work, free, mask)
+    for w in range(len(out)):
+        out[w] |= ~free[w]
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _free(
+    body: Profiles,
+    b: int,
+    polygons: Polygons,
+    k: int,
+    px: float,
+    pz: float,
+    row: Row,
+    margin: float,
+    turn: float,
+    exact: bool,
+    work: Array,
+    free: AnyArray,
+    mask: AnyArray,
+) -> bool:
+    """Set free to the cells in which some edge separates; False when `exact` is needed to tell.
+
+    work[0]: offsets of the polygon's edges as seen from the pivot.
+    """
     corners, edges = body.count[b], polygons.count[k]
     free[:] = 0
-    reach, depth = body.reach[b], body.depth[b] + SLACK
     for i in range(edges):
-        nx, nz = polygons.normal_x[k, i], polygons.normal_z[k, i]
-        c = polygons.offset[k, i] - nx * px - nz * pz + margin
-        if c >= depth:
+        c = work[0, i]
+        if c >= body.depth[b] + SLACK:
             continue
-        if c < -reach:
-            return
-        normal = math.atan2(nz, nx)
+        normal = bearing(polygons.normal_x[k, i], polygons.normal_z[k, i], exact)
         mask[:] = ALL
         for v in range(corners):
             r = body.radius[b, v]
             if c <= -r:
                 continue
-            half = math.acos(c / r) - turn if c < r else -1.0
+            half = arc_cosine(c / r, exact) - turn if c < r else -1.0
             if half <= 0.0:
                 mask[:] = 0
                 break
-            if half < math.pi:
-                _keep_arc(normal - body.bearing[b, v], half, row, mask)
-        for w in range(words):
+            if half < math.pi and not _arc(
+                normal - body.bearing[b, v], half, row, True, exact, mask
+            ):
+                return False
+        for w in range(len(free)):
             free[w] |= mask[w]
+    nearest = math.inf
+    for v in range(edges):
+        x, z = polygons.x[k, v] - px, polygons.z[k, v] - pz
+        work[1, v] = math.sqrt(x * x + z * z)
+        work[2, v] = bearing(x, z, exact)
+        nearest = min(nearest, work[1, v])
     for j in range(corners):
         e = body.offset[b, j] + margin
-        beyond = True
-        for v in range(edges):
-            x, z = polygons.x[k, v] - px, polygons.z[k, v] - pz
-            if e >= 0.0 and x * x + z * z <= e * e:
-                beyond = False
-                break
-        if not beyond:
+        if e >= nearest:
+            continue
+        if e >= 0.0 and turn >= 0.0:
+            # Arcs of at most half a turn each meet in one arc, near the first one's middle.
+            low, high = -math.inf, math.inf
+            for v in range(edges):
+                half = arc_cosine(e / work[1, v], exact) - turn
+                offset = work[2, v] - work[2, 0]
+                offset -= 2.0 * math.pi * math.floor(offset / (2.0 * math.pi) + 0.5)
+                low, high = max(low, offset - half), min(high, offset + half)
+                if low >= high:
+                    break
+            if low < high:
+                center = work[2, 0] + 0.5 * (low + high) - body.normal[b, j]
+                if not _arc(center, 0.5 * (high - low), row, False, exact, free):
+                    return False
             continue
         mask[:] = ALL
         for v in range(edges):
-            x, z = polygons.x[k, v] - px, polygons.z[k, v] - pz
-            r = math.sqrt(x * x + z * z)
+            r = work[1, v]
             if e <= -r:
                 continue
-            half = math.acos(e / r) - turn if e < r else -1.0
+            half = arc_cosine(e / r, exact) - turn if e < r else -1.0
             if half <= 0.0:
                 mask[:] = 0
                 break
-            if half < math.pi:
-                _keep_arc(math.atan2(z, x) - body.normal[b, j], half, row, mask)
-        for w in range(words):
+            if half < math.pi and not _arc(
+                work[2, v] - body.normal[b, j], half, row, True, exact, mask
+            ):
+                return False
+        for w in range(len(free)):
             free[w] |= mask[w]
-    for w in range(words):
-        out[w] |= ~free[w]
+    return True
 
 
 @njit(cache=True, nogil=True, inline="always")  # type: ignore[untyped-decorator]

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from backend.machine.model import Machine
-from backend.machine.outline import part_outlines
+from backend.machine.outline import outlines_of
 from backend.machine.sun_map import sun_angles
 from backend.pipeline.config import Config
 from backend.pipeline.records import MachineState, PairDistance, Snapshot
@@ -78,7 +78,7 @@ def machine_document(state: MachineState, machine: Machine, config: Config) -> d
         "max_reach": machine.max_reach,
     }
     if state.body is not None:
-        outlines = part_outlines(machine, state.body.link_poses)
+        outlines = outlines_of(machine, state.body.boxes)
         angles = sun_angles(machine, pose.joints)
         document |= {
             "swing_center": state.body.swing_center.tolist(),

@@ -14,12 +14,12 @@ from scipy.spatial import cKDTree
 
 from backend.machine.fitting_clip import outside_box, sample, subdivided, thin
 from backend.machine.fitting_field import box_surface, distance_field
-from backend.machine.fitting_search import search
+from backend.machine.fitting_search import Piece, search
 from backend.spatial.boxes import Boxes
 from backend.spatial.types import Array
 
 PAD = 7e-4  # [m] on every side: rounding, and the arc between two samples of a cylinder's sweep
-_SLACK = 0.035  # [m] the search aims this much below max_excess: grid, sampling, final growth
+_SLACK = 0.045  # [m] the search aims this much below max_excess: grid, sampling, final growth
 
 
 def fit_boxes(
@@ -42,14 +42,23 @@ def fit_boxes(
     report = progress or (lambda share: None)
     points = _points(triangles)
     field = distance_field(triangles)
-    pieces = search(points, field, max_boxes, max(max_excess - _SLACK, 0.5 * max_excess), report)
-    R = np.array([p.R for p in pieces])
-    low, high = _grown(
-        triangles, R, np.array([p.low for p in pieces]), np.array([p.high for p in pieces])
-    )
+    tolerance = max(max_excess - _SLACK, 0.5 * max_excess)
+    mesh = _mesh_points(triangles)
+
+    def boxes_of(pieces: list[Piece]) -> Boxes:
+        R = np.array([p.R for p in pieces])
+        low, high = np.array([p.low for p in pieces]), np.array([p.high for p in pieces])
+        low, high = _grown(triangles, R, low, high)
+        centers = (R @ ((low + high) / 2.0)[:, :, None])[:, :, 0]
+        return Boxes(centers, R, (high - low) / 2.0 + PAD)
+
+    def good_enough(pieces: list[Piece]) -> bool:
+        # The grid errs by up to two centimetres: only near the goal is a closer look worth it.
+        return _farthest(boxes_of(pieces), mesh, 0.03) <= max_excess
+
+    found = search(points, field, max_boxes, tolerance, report, good_enough)
     report(1.0)
-    centers = (R @ ((low + high) / 2.0)[:, :, None])[:, :, 0]
-    return Boxes(centers, R, (high - low) / 2.0 + PAD)
+    return min(map(boxes_of, found), key=lambda boxes: _farthest(boxes, mesh, 0.03))
 
 
 def excess(boxes: Boxes, triangles: Array, spacing: float = 0.03) -> float:
@@ -59,9 +68,7 @@ def excess(boxes: Boxes, triangles: Array, spacing: float = 0.03) -> float:
     grid of at most `spacing` [m] on each face; points inside another box are not on the surface.
     triangles: (n, 3, 3) [m]. The mesh is sampled at 15 mm, so the value errs high by < 1 cm.
     """
-    points = surface_points(boxes, spacing)
-    mesh = thin(sample(np.asarray(triangles, dtype=float), 0.015), 0.005)
-    return float(np.max(cKDTree(mesh).query(points)[0])) if len(points) else 0.0
+    return _farthest(boxes, _mesh_points(np.asarray(triangles, dtype=float)), spacing)
 
 
 def surface_points(boxes: Boxes, spacing: float) -> Array:
@@ -78,11 +85,20 @@ def surface_points(boxes: Boxes, spacing: float) -> Array:
     return np.concatenate(kept)
 
 
+def _mesh_points(triangles: Array) -> cKDTree:
+    return cKDTree(thin(sample(triangles, 0.015), 0.005))
+
+
+def _farthest(boxes: Boxes, mesh: cKDTree, spacing: float) -> float:
+    points = surface_points(boxes, spacing)
+    return float(np.max(mesh.query(points)[0])) if len(points) else 0.0
+
+
 def _points(triangles: Array) -> Array:
-    """Points of the mesh for the search: as dense as 25,000 of them allow, 3 to 6 cm."""
+    """Points of the mesh for the search: as dense as 15,000 of them allow, 3 to 6 cm."""
     spacing = 0.03
     dense = points = thin(sample(triangles, spacing), spacing / 2.0)
-    while len(points) > 25_000 and spacing < 0.05:
+    while len(points) > 15_000 and spacing < 0.06:
         spacing *= 1.15
         points = thin(dense, spacing)
     return np.ascontiguousarray(points)

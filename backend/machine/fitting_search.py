@@ -16,9 +16,10 @@ import numpy as np
 from backend.machine import fitting_kernels as kernels
 from backend.machine.fitting_field import Field
 from backend.spatial.rotation import about_axis
-from backend.spatial.types import Array, IntArray
+from backend.spatial.types import Array, BoolArray, IntArray
 
 VOLUME = 1e-6  # cost of a cubic metre: among sets that exceed the mesh alike, the smaller
+KEPT = 10  # sets looked at closely in the end
 _ANGLES: Array = np.radians(np.arange(0.0, 90.0, 3.0))
 _NONE: IntArray = np.zeros(0, dtype=np.int64)
 
@@ -47,10 +48,11 @@ class Piece:
         """The cost of this box alone."""
         return float(self.cost.sum()) + VOLUME * self.volume
 
-    def holds(self, points: Array) -> Array:
+    def holds(self, points: Array) -> BoolArray:
         """(n,) whether points (n, 3) are in the box."""
         local = points @ self.R
-        return np.asarray(((local >= self.low - 1e-9) & (local <= self.high + 1e-9)).all(axis=1))
+        inside = (local >= self.low - 1e-9) & (local <= self.high + 1e-9)
+        return np.asarray(inside.all(axis=1), dtype=np.bool_)
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,6 +111,22 @@ class Search:
     def cost(self, pieces: list[Piece]) -> float:
         """What sticks out of the mesh over the whole union of boxes."""
         return float(self.shares(pieces).sum())
+
+    def worst(self, pieces: list[Piece]) -> float:
+        """The largest distance to the mesh over the union's surface [m]; 0 within tolerance."""
+        largest = 0.0
+        for p in pieces:
+            far = p.far
+            for other in pieces:
+                if other is not p and len(far):
+                    far = far[~other.holds(far)]
+            if len(far):
+                f = self.distance
+                i, j, k = np.rint((far - f.origin) / f.step).astype(np.int64).T
+                top = np.array(f.distance.shape) - 1
+                near = f.distance[i.clip(0, top[0]), j.clip(0, top[1]), k.clip(0, top[2])]
+                largest = max(largest, float(near.max()))
+        return largest
 
     def splits(self, p: Piece) -> list[tuple[Piece, Piece]]:
         """Pairs that replace a piece, best first: cuts across its own axes and the frame's."""
@@ -240,12 +258,16 @@ def search(
     max_boxes: int,
     tolerance: float,
     progress: Callable[[float], None],
+    good_enough: Callable[[list[Piece]], bool],
     rounds: int = 120,
     patience: int = 80,
-) -> list[Piece]:
-    """At most `max_boxes` pieces that cover all points with the least cost found.
+) -> list[list[Piece]]:
+    """Sets of at most `max_boxes` pieces that cover all points, for a closer look at each.
 
-    Ends after `rounds` trials, or after `patience` of them in a row without a better set.
+
+    The cost leads the search; returned are the cheapest set and those of the least excess met on
+    the way.
+    `good_enough` ends it at once; else it ends after `rounds` trials, or after `patience` of them in a row without a better set.
     """
     s = Search(points, distance, tolerance)
     starts = [s.start(max_boxes, 2 * max_boxes, alone) for alone in (False, True)]
@@ -253,18 +275,25 @@ def search(
     least = s.cost(pieces)
     rng = np.random.default_rng(1)
     last_gain = 0
+    pieces = s.turned(pieces)
+    met = [(s.worst(p), -1, p) for p in (pieces, *starts)]
     for r in range(rounds):
         progress(0.2 + 0.8 * r / rounds)
-        if least <= 2.0 * VOLUME * sum(p.volume for p in pieces) or r - last_gain > patience:
+        if r - last_gain > patience:
             break
         trial = s.improved(pieces, rng, (1, 1, 2, 1, 1, 3)[r % 6])
         value = s.cost(trial)
-        if value < 1.3 * least:
+        if value < 1.3 * least + 1e-12:
             trial = s.turned(s.shrunk(trial)) if r % 4 == 3 else s.shrunk(trial)
             value = s.cost(trial)
+        if value < 1.3 * least + 1e-12:
+            met.append((s.worst(trial), r, trial))
+            if met[-1][0] < tolerance + 0.05 and good_enough(trial):
+                return [trial]
         if value < least - 1e-12:
             pieces, least, last_gain = trial, value, r
-    return s.turned(pieces)
+    met.sort(key=lambda item: item[:2])
+    return [s.turned(pieces), pieces, *(p for _, _, p in met[:KEPT])]
 
 
 def _stacked(pieces: list[Piece]) -> tuple[Array, Array, Array]:

@@ -110,14 +110,21 @@ def jacobian(
     p = (T_link[..., :3, :3] @ np.asarray(point, dtype=float)[..., None])[..., 0] + T_link[
         ..., :3, 3
     ]
-    J = np.zeros((*T.shape[:-3], 6 if angular else 3, len(machine.joints)))
+    return point_jacobian(machine, T, link, p, angular)
+
+
+def point_jacobian(
+    machine: Machine, T_site_links: Array, link: int, p_site: Array, angular: bool = False
+) -> Array:
+    """The same from link poses (..., L, 4, 4) and a point (..., 3) of the site [m]."""
+    J = np.zeros((*T_site_links.shape[:-3], 6 if angular else 3, len(machine.joints)))
     i = link
     while i >= 0:
         k = machine.links[i].joint
         if k >= 0:
             # The joint frame and its link share origin and axis: rotation leaves both in place.
-            z = T[..., i, :3, :3] @ machine.links[i].axis
-            J[..., :3, k] = np.cross(z, p - T[..., i, :3, 3])
+            z = T_site_links[..., i, :3, :3] @ machine.links[i].axis
+            J[..., :3, k] = np.cross(z, p_site - T_site_links[..., i, :3, 3])
             if angular:
                 J[..., 3:, k] = z
         i = machine.links[i].parent

@@ -191,5 +191,10 @@ class Machine:
         """(n,) body_links as an index array."""
         return np.array(self.body_links, dtype=np.int64)
 
+    @cached_property
+    def body_parts(self) -> AnyArray:
+        """(n,) the part of each body."""
+        return np.array([self.links[link].part for link in self.body_links])
+
     def part_of_body(self, index: int) -> str:
         return self.links[self.body_links[index]].part

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import numpy as np
-from scipy.spatial import ConvexHull, QhullError
+import shapely
 
 from backend.machine.kinematics import body_boxes
 from backend.machine.model import PARTS, Machine
@@ -12,7 +11,7 @@ from backend.spatial.types import Array
 
 
 def part_outlines(machine: Machine, T_site_links: Array) -> dict[str, Array]:
-    """Part -> convex outline (k, 2) [m] of its boxes in the site's plan, counter-clockwise.
+    """Part -> convex outline (k, 2) [m] of its boxes in the site's plan.
 
     T_site_links: (L, 4, 4). Parts in the order of PARTS; the outline is not closed (its first
     point is not repeated).
@@ -23,13 +22,13 @@ def part_outlines(machine: Machine, T_site_links: Array) -> dict[str, Array]:
 def outlines_of(machine: Machine, boxes: Boxes) -> dict[str, Array]:
     """The same from the machine's placed bodies."""
     plan = boxes.corners()[..., :2]
-    parts = np.array([machine.part_of_body(b) for b in range(len(boxes))])
+    parts = machine.body_parts
     return {part: _hull(plan[parts == part].reshape(-1, 2)) for part in PARTS if part in parts}
 
 
 def _hull(points: Array) -> Array:
-    try:
-        return np.asarray(points[ConvexHull(points).vertices])
-    except QhullError:  # boxes without width in plan: the two ends of the line
-        along = points @ np.ptp(points, axis=0)
-        return points[[int(np.argmin(along)), int(np.argmax(along))]]
+    """Counter-clockwise; the two ends where boxes have no width in plan."""
+    hull = shapely.convex_hull(shapely.multipoints(points))
+    if isinstance(hull, shapely.Polygon):
+        return shapely.get_coordinates(shapely.orient_polygons(hull))[:-1]
+    return shapely.get_coordinates(hull)

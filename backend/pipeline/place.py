@@ -33,10 +33,6 @@ def place(machine: Machine, q: Array, T_site_root: Array) -> Body3D:
     )
 
 
-def point_jacobian(machine: Machine, body: Body3D, q: Array, index: int, point: Array) -> Array:
+def point_jacobian(machine: Machine, body: Body3D, index: int, point: Array) -> Array:
     """(3, n) velocity [m/s] per joint rate of a site point (3,) that moves with body `index`."""
-    link = machine.body_links[index]
-    local = transform.apply(transform.inverse(body.link_poses[link]), point[None])[0]
-    root = machine.links[0]
-    T_site_root = body.link_poses[0] @ transform.inverse(root.T_parent_joint)
-    return kinematics.jacobian(machine, q, T_site_root, link, local)
+    return kinematics.point_jacobian(machine, body.link_poses, machine.body_links[index], point)

@@ -106,9 +106,7 @@ def _both_sides(
     for side, (name, sign) in enumerate(((a, 1.0), (b, -1.0))):
         machine, state = config.machines[name], states[name]
         assert state.body is not None
-        J = point_jacobian(
-            machine, state.body, state.pose.joints, int(found.index[k, side]), points[side]
-        )
+        J = point_jacobian(machine, state.body, int(found.index[k, side]), points[side])
         away = sign * direction
         forward = np.array([np.cos(state.pose.yaw), np.sin(state.pose.yaw), 0.0])
         velocity = J @ state.pose.joint_velocities + state.pose.base_velocity

@@ -9,7 +9,7 @@ import { mark } from "./words.js";
  * probe(x, y) returns lines of text for the pointer, or null.
  */
 export function surface(canvas, paint, probe) {
-  const g = canvas.getContext("2d", { alpha: false });
+  const g = canvas.getContext("2d", { alpha: false, willReadFrequently: true });
   const s = { canvas, probe, width: 0, height: 0, dirty: true, last: -Infinity, lastLabel: -Infinity, cost: 0 };
 
   new ResizeObserver(() => {

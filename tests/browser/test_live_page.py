@@ -102,20 +102,16 @@ def test_a_killed_machine_is_stale_on_the_page_and_recovers(watch: Watch) -> Non
         )
         processes["right"].send_signal(signal.SIGKILL)
         killed = time.time()
-        page.wait_for_function("window.staleAt !== null", timeout=5000)
+        watched.until("window.staleAt !== null", 5.0)
         assert page.evaluate("window.staleAt") - killed <= 0.35  # 0.3 s and a timer's turn
-        page.wait_for_function(
-            "document.getElementById('alarm-line').textContent.startsWith('UNKNOWN')"
-        )
+        watched.until("document.getElementById('alarm-line').textContent.startsWith('UNKNOWN')")
         line = page.inner_text("#alarm-line")
         assert "RIGHT" in line
         assert "CLEAR" not in page.inner_text("#alarm")
         assert json.loads(page.get_attribute("#plan", "data-state") or "{}")["nearest"] is None
         processes["right"].wait()
         processes["right"] = simulate(site, "right", station.endpoint)
-        page.wait_for_function(
-            "window.cockpit.state.snapshot.machines.right.validity === 'VALID'", timeout=40_000
-        )
+        watched.until("window.cockpit.state.snapshot.machines.right.validity === 'VALID'", 40.0)
         assert watched.errors == []
 
 
@@ -124,5 +120,5 @@ def test_a_reconnecting_page_is_current_within_two_seconds(moving: Backend, watc
     page = watched.page
     page.reload()
     begun = time.monotonic()
-    page.wait_for_function("window.cockpit?.state.snapshot !== null", timeout=10_000)
+    watched.until("window.cockpit?.state.snapshot !== null", 10.0)
     assert time.monotonic() - begun < 2.0

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -29,11 +28,14 @@ def test_each_panel_draws_what_the_snapshot_says(
     watched = watch(still.url, SIZES[0])
     page = watched.page
     page.keyboard.press("2")  # B is the machine that must avoid A, as in the paper
-    page.wait_for_function(
+    watched.until(
         "JSON.parse(document.getElementById('reach').dataset.state).own === 'b'"
         " && JSON.parse(document.getElementById('slice-0').dataset.state).own === 'b'"
     )
-    time.sleep(1.0)
+    watched.until(
+        "JSON.parse(document.getElementById('reach').dataset.state).hollow === false"
+        " && JSON.parse(document.getElementById('trends').dataset.state).points > 3"
+    )
     drawn = watched.canvases()
     snapshot = still.get("/api/snapshot")
     machine = snapshot["machines"]["b"]

@@ -50,7 +50,7 @@ class Sources:
 
 def create_app(sources: Sources, viewer: APIRouter | None = None) -> FastAPI:
     """The application. viewer: routes of the 3D view, served below /view."""
-    app = FastAPIOffline(  # its documentation page needs no network
+    app: FastAPI = FastAPIOffline(  # its documentation page needs no network
         title="Excavator cockpit",
         description="Fused poses, distances, warning zones and C-space images of a site's "
         "excavators. SI units and radians; null where a value is unknown. An operator aid, not a "

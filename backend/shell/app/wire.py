@@ -12,6 +12,7 @@ import struct
 from collections.abc import Mapping
 from typing import Any
 
+import msgspec
 import numpy as np
 
 from backend.spatial.types import AnyArray
@@ -57,18 +58,11 @@ def decode(frame: bytes) -> tuple[dict[str, Any], dict[str, AnyArray]]:
 
 def dumps(document: Any) -> str:
     """JSON in which what is not a number (NaN, infinity) is null, as JSON has no word for it."""
-    return json.dumps(_plain(document), separators=(",", ":"), allow_nan=False)
+    return msgspec.json.encode(document, enc_hook=_plain).decode()
 
 
 def _plain(value: Any) -> Any:
-    if isinstance(value, Mapping):
-        return {str(k): _plain(v) for k, v in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_plain(v) for v in value]
-    if isinstance(value, np.ndarray):
-        return _plain(value.tolist())
-    if isinstance(value, (float, np.floating)):
-        return float(value) if math.isfinite(value) else None
-    if isinstance(value, np.generic):
-        return value.item()
-    return value
+    """What only numpy knows, as plain Python."""
+    if isinstance(value, (np.ndarray, np.generic)):
+        return value.tolist()
+    raise TypeError(f"{type(value).__name__} has no place in a JSON document")

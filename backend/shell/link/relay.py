@@ -16,23 +16,22 @@ PERIOD = 0.1  # [s]
 class Relay:
     """Publishes the newest snapshot and images at 10 Hz, and alarms when they change.
 
-    snapshot_text, alarms_text: JSON of a snapshot, and of its alarms; images: (state time, frame)
-    of every image by (kind, pair).
+    texts: JSON of a snapshot, and of its alarms; images: (state time, frame) of every image by
+    (kind, pair).
     """
 
     def __init__(
         self,
         session: Any,
         hub: Hub,
-        snapshot_text: Callable[[Snapshot], str],
-        alarms_text: Callable[[Snapshot], str],
+        texts: Callable[[Snapshot], tuple[str, str]],
         images: Callable[[], Mapping[tuple[str, str], tuple[float, bytes]]],
     ) -> None:
         self._hub = hub
         self._session = session
         self._images = images
         self._image_publishers: dict[str, Any] = {}
-        self._texts = snapshot_text, alarms_text
+        self._texts = texts
         self._snapshots = publisher(session, "snapshot")
         self._alarms = publisher(session, "alarm")
         self._stopping = threading.Event()
@@ -53,14 +52,13 @@ class Relay:
     def _run(self) -> None:
         cycle, said = -1, ""
         sent: dict[tuple[str, str], float] = {}
-        snapshot_text, alarms_text = self._texts
         while not self._stopping.wait(PERIOD):
             snapshot = self._hub.wait(cycle, PERIOD)
             if snapshot is None:
                 continue
             cycle = snapshot.cycle
-            self._snapshots.put(snapshot_text(snapshot))
-            alarms = alarms_text(snapshot)
+            text, alarms = self._texts(snapshot)
+            self._snapshots.put(text)
             if alarms != said:
                 said = alarms
                 self._alarms.put(alarms)

@@ -1,0 +1,201 @@
+"""Compiled loops over pairs of oriented boxes; `box_distance` documents and wraps them."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from backend.spatial.types import Array, IntArray
+
+_PARALLEL = 1e-12  # squared sine below which two edges count as parallel
+_NO_AXIS = 1e-9  # length below which a crossed axis gives no direction
+
+
+@njit(cache=True, nogil=True)
+def lower_bounds(ca: Array, Ra: Array, ha: Array, cb: Array, Rb: Array, hb: Array) -> Array:
+    """(n, m) lower bounds of the distances of all pairs [m].
+
+    Each box against the other's bounding box in its own frame, the larger of both.
+    """
+    n, m = ca.shape[0], cb.shape[0]
+    bound = np.empty((n, m))
+    for i in range(n):
+        for j in range(m):
+            sum_a = sum_b = 0.0
+            for k in range(3):
+                at_a = at_b = 0.0
+                wide_a = wide_b = 0.0
+                for x in range(3):
+                    at_a += Ra[i, x, k] * (cb[j, x] - ca[i, x])
+                    at_b += Rb[j, x, k] * (cb[j, x] - ca[i, x])
+                for other in range(3):
+                    dot_a = dot_b = 0.0
+                    for x in range(3):
+                        dot_a += Ra[i, x, k] * Rb[j, x, other]
+                        dot_b += Rb[j, x, k] * Ra[i, x, other]
+                    wide_a += abs(dot_a) * hb[j, other]
+                    wide_b += abs(dot_b) * ha[i, other]
+                gap_a = abs(at_a) - ha[i, k] - wide_a
+                gap_b = abs(at_b) - hb[j, k] - wide_b
+                if gap_a > 0.0:
+                    sum_a += gap_a * gap_a
+                if gap_b > 0.0:
+                    sum_b += gap_b * gap_b
+            bound[i, j] = np.sqrt(max(sum_a, sum_b))
+    return bound
+
+
+@njit(cache=True, nogil=True)
+def separation(ca: Array, Ra: Array, ha: Array, cb: Array, Rb: Array, hb: Array) -> float:
+    """Largest gap of two boxes along the 15 separating axes [m]; negative on overlap."""
+    best = -np.inf
+    axis = np.empty(3)
+    for first in range(4):
+        for second in range(4):
+            if first == 3 and second == 3:
+                continue
+            if second == 3:
+                for x in range(3):
+                    axis[x] = Ra[x, first]
+            elif first == 3:
+                for x in range(3):
+                    axis[x] = Rb[x, second]
+            else:
+                for x in range(3):
+                    y, z = (x + 1) % 3, (x + 2) % 3
+                    axis[x] = Ra[y, first] * Rb[z, second] - Ra[z, first] * Rb[y, second]
+            length = np.sqrt(axis[0] ** 2 + axis[1] ** 2 + axis[2] ** 2)
+            # Parallel edges give no axis of their own; the face axes already cover them.
+            if length < _NO_AXIS:
+                continue
+            apart = 0.0
+            for x in range(3):
+                apart += axis[x] * (cb[x] - ca[x])
+            gap = abs(apart)
+            for k in range(3):
+                along_a = along_b = 0.0
+                for x in range(3):
+                    along_a += axis[x] * Ra[x, k]
+                    along_b += axis[x] * Rb[x, k]
+                gap -= abs(along_a) * ha[k] + abs(along_b) * hb[k]
+            best = max(best, gap / length)
+    return best
+
+
+@njit(cache=True, nogil=True)
+def _nearest_in_box(p: Array, c: Array, R: Array, h: Array, out: Array) -> float:
+    """Writes the point of a box nearest to p; returns the squared distance [m^2]."""
+    local = np.empty(3)
+    for k in range(3):
+        value = 0.0
+        for x in range(3):
+            value += R[x, k] * (p[x] - c[x])
+        local[k] = min(max(value, -h[k]), h[k])
+    square = 0.0
+    for x in range(3):
+        out[x] = c[x] + R[x, 0] * local[0] + R[x, 1] * local[1] + R[x, 2] * local[2]
+        square += (out[x] - p[x]) ** 2
+    return square
+
+
+@njit(cache=True, nogil=True)
+def _corners(c: Array, R: Array, h: Array) -> Array:
+    """(8, 3); bit k of the index is the sign along axis k."""
+    points = np.empty((8, 3))
+    for i in range(8):
+        for x in range(3):
+            points[i, x] = c[x]
+            for k in range(3):
+                points[i, x] += R[x, k] * (h[k] if i >> k & 1 else -h[k])
+    return points
+
+
+@njit(cache=True, nogil=True)
+def pair_distance(
+    ca: Array, Ra: Array, ha: Array, cb: Array, Rb: Array, hb: Array, points: Array
+) -> float:
+    """Distance of two boxes [m], writing the closest points (2, 3); negative on overlap."""
+    gap = separation(ca, Ra, ha, cb, Rb, hb)
+    if gap <= 0.0:
+        middle = 0.5 * (ca + cb)
+        in_a, in_b = np.empty(3), np.empty(3)
+        _nearest_in_box(middle, ca, Ra, ha, in_a)
+        _nearest_in_box(middle, cb, Rb, hb, in_b)
+        for x in range(3):
+            points[0, x] = points[1, x] = 0.5 * (in_a[x] + in_b[x])
+        return gap
+    best = np.inf
+    near = np.empty(3)
+    corners_a, corners_b = _corners(ca, Ra, ha), _corners(cb, Rb, hb)
+    for i in range(8):
+        square = _nearest_in_box(corners_a[i], cb, Rb, hb, near)
+        if square < best:
+            best = square
+            points[0], points[1] = corners_a[i], near
+        square = _nearest_in_box(corners_b[i], ca, Ra, ha, near)
+        if square < best:
+            best = square
+            points[0], points[1] = near, corners_b[i]
+    for i in range(8):
+        for ki in range(3):
+            if i >> ki & 1:
+                continue
+            p, u = corners_a[i], corners_a[i | 1 << ki] - corners_a[i]
+            for j in range(8):
+                for kj in range(3):
+                    if j >> kj & 1:
+                        continue
+                    q, v = corners_b[j], corners_b[j | 1 << kj] - corners_b[j]
+                    s, t = _nearest_on_segments(p, u, q, v)
+                    square = 0.0
+                    for x in range(3):
+                        square += (p[x] + s * u[x] - q[x] - t * v[x]) ** 2
+                    if square < best:
+                        best = square
+                        for x in range(3):
+                            points[0, x] = p[x] + s * u[x]
+                            points[1, x] = q[x] + t * v[x]
+    return np.sqrt(best)
+
+
+@njit(cache=True, nogil=True)
+def _nearest_on_segments(p: Array, u: Array, q: Array, v: Array) -> tuple[float, float]:
+    """Parameters in [0, 1] of the closest points of the segments p + s u and q + t v."""
+    uu = vv = uv = uw = vw = 0.0
+    for x in range(3):
+        w = p[x] - q[x]
+        uu += u[x] * u[x]
+        vv += v[x] * v[x]
+        uv += u[x] * v[x]
+        uw += u[x] * w
+        vw += v[x] * w
+    uu, vv = max(uu, 1e-300), max(vv, 1e-300)
+    det = uu * vv - uv * uv
+    s = 0.0
+    if det > _PARALLEL * uu * vv:
+        s = min(max((uv * vw - vv * uw) / det, 0.0), 1.0)
+    t = min(max((uv * s + vw) / vv, 0.0), 1.0)
+    # t may have been clamped: the best s for it.
+    s = min(max((uv * t - uw) / uu, 0.0), 1.0)
+    return s, t
+
+
+@njit(cache=True, nogil=True)
+def distances(
+    ca: Array,
+    Ra: Array,
+    ha: Array,
+    cb: Array,
+    Rb: Array,
+    hb: Array,
+    index_a: IntArray,
+    index_b: IntArray,
+) -> tuple[Array, Array]:
+    """Distances (k,) and closest points (k, 2, 3) of the pairs (index_a[k], index_b[k]) [m]."""
+    count = index_a.shape[0]
+    found = np.empty(count)
+    points = np.empty((count, 2, 3))
+    for k in range(count):
+        i, j = index_a[k], index_b[k]
+        found[k] = pair_distance(ca[i], Ra[i], ha[i], cb[j], Rb[j], hb[j], points[k])
+    return found, points

@@ -1,0 +1,105 @@
+"""The reach image: the present posture swung to another direction and extended to another reach."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+
+from backend.cspace.exact_points import touching
+from backend.machine import inverse
+from backend.machine.kinematics import end_point
+from backend.machine.model import Machine
+from backend.machine.sun_map import sun_angles
+from backend.spatial import transform
+from backend.spatial.boxes import Boxes
+from backend.spatial.types import AnyArray, Array
+
+
+class ReachState(IntEnum):
+    """Of one cell. What is out of reach or beyond a limit is not asked for collision."""
+
+    FREE = 0
+    COLLIDING = 1
+    OUT_OF_REACH = 2
+    BEYOND_LIMIT = 3
+
+
+@dataclass(frozen=True)
+class ReachImage:
+    """swing: (s,) joint values [rad]; reach: (r,) of the tip from the swing axis [m], cell centres.
+
+    state: (s, r) ReachState as uint8; against, itself: (s, r) whether a colliding cell touches an
+    obstacle, or the machine itself; height: of the tip above the swing joint's origin, along the
+    swing axis [m]; attitude: of the bucket [rad]; elbow: +1 up, -1 down.
+    """
+
+    swing: Array
+    reach: Array
+    swing_edges: Array
+    reach_edges: Array
+    state: AnyArray
+    against: AnyArray
+    itself: AnyArray
+    height: float
+    attitude: float
+    elbow: int
+
+
+def reach_image(
+    machine: Machine,
+    q: Array,
+    obstacles: Boxes,
+    shape: tuple[int, int] = (90, 60),
+    height: float | None = None,
+) -> ReachImage:
+    """Every cell's configuration has the tip at q's height and the bucket at q's attitude.
+
+    q: (n,) present joint values [rad]; obstacles in the machine's root frame; height of the tip
+    above the swing joint's origin, along the swing axis [m], the present one when None. The elbow
+    stays on its present side. Swing covers the joint's range, a full turn when continuous; reach 0
+    to the machine's largest.
+    """
+    q = np.asarray(q, dtype=float)
+    joint = machine.joints[0]
+    low = joint.lower if np.isfinite(joint.lower) else -np.pi
+    high = joint.upper if np.isfinite(joint.upper) else np.pi
+    swing_edges = np.linspace(low, high, shape[0] + 1)
+    reach_edges = np.linspace(0.0, machine.max_reach, shape[1] + 1)
+    swing = 0.5 * (swing_edges[:-1] + swing_edges[1:])
+    reach = 0.5 * (reach_edges[:-1] + reach_edges[1:])
+
+    theta = sun_angles(machine, q)
+    attitude = float(theta.sum())
+    elbow = 1 if np.sin(theta[1]) <= 0.0 else -1
+    p_now = transform.apply(
+        transform.inverse(machine.arm.T_root_swing), end_point(machine, q)[None]
+    )[0]
+    z = float(p_now[2]) if height is None else float(height)
+
+    # The inverse takes a point; where the tip stands beside the arm's plane, its direction from the
+    # axis differs from the arm's by the same angle that the inverse takes off again.
+    S, D = np.meshgrid(swing, reach, indexing="ij")
+    lateral = machine.arm.tip_lateral
+    beside = np.arctan2(lateral, np.sqrt(np.maximum(D**2 - lateral**2, 0.0)))
+    azimuth = machine.sun.azimuth_sign * S + machine.sun.azimuth_offset + beside
+    p_swing = np.stack([D * np.cos(azimuth), D * np.sin(azimuth), np.full_like(D, z)], axis=-1)
+    p_root = transform.apply(machine.arm.T_root_swing, p_swing)
+    solution = inverse.inverse(machine, p_root, attitude, elbow)
+    configurations = solution.q.copy()
+    configurations[..., 0] = S
+    configurations[..., 4:] = q[4:]
+
+    state = np.full(S.shape, ReachState.FREE, dtype=np.uint8)
+    joints = configurations[..., 1:]
+    kept = (joints >= machine.lower[1:] - 1e-9) & (joints <= machine.upper[1:] + 1e-9)
+    state[~kept.all(axis=-1)] = ReachState.BEYOND_LIMIT
+    state[~solution.reachable] = ReachState.OUT_OF_REACH
+    asked = state == ReachState.FREE
+    against, itself = np.zeros(S.shape, dtype=bool), np.zeros(S.shape, dtype=bool)
+    against[asked], itself[asked] = touching(machine, configurations[asked], obstacles)
+    state[against | itself] = ReachState.COLLIDING
+    return ReachImage(
+        swing, reach, swing_edges, reach_edges, state, against, itself, z, attitude, elbow
+    )
