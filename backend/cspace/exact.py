@@ -52,7 +52,7 @@ class JointGrid:
     @property
     def steps(self) -> Array:
         """(4,) width of a cell [rad]."""
-        return (self.upper - self.lower) / np.array(self.shape)
+        return np.asarray((self.upper - self.lower) / np.array(self.shape))
 
     def centers(self, joint: int) -> Array:
         """(n,) [rad]."""
@@ -257,9 +257,7 @@ def _full_words(grid: JointGrid) -> AnyArray:
 
 def _moved(T: Array, boxes: Boxes) -> Boxes:
     """Boxes in another frame. T: (4, 4)."""
-    return Boxes(
-        transform.apply(T, boxes.centers), T[:3, :3] @ boxes.rotations, boxes.half_extents
-    )
+    return Boxes(transform.apply(T, boxes.centers), T[:3, :3] @ boxes.rotations, boxes.half_extents)
 
 
 def unpacked(bits: AnyArray, cells: int) -> BoolArray:

@@ -82,7 +82,7 @@ def _slices(
         if beside > wide or away - size > reach + wide:
             continue
         for b in range(len(body.group)):
-            if body.count[b] > 0 and pairs[b, j]:
+            if body.sides[b] > 0 and pairs[b, j]:
                 wanted[body.slab[b], j] = True
     room = 0
     for s in range(slabs):
@@ -155,7 +155,7 @@ def _pairs_of(body: Profiles, polygons: Polygons, pairs: BoolArray, group: int) 
     out = np.empty((len(body.group) * len(polygons.slab), 2), np.int64)
     k = 0
     for b in range(len(body.group)):
-        if body.group[b] != group or body.count[b] == 0:
+        if body.group[b] != group or body.sides[b] == 0:
             continue
         for p in range(len(polygons.slab)):
             if polygons.slab[p] == body.slab[b] and pairs[b, polygons.obstacle[p]]:
@@ -168,7 +168,7 @@ def _pairs_of(body: Profiles, polygons: Polygons, pairs: BoolArray, group: int) 
 def _near(
     chosen: IntArray, body: Profiles, polygons: Polygons, px: float, pz: float, extra: float
 ) -> IntArray:
-    """The pairs whose polygon comes within reach of the body, its pivot within extra of (px, pz)."""
+    """The pairs whose polygon is within reach of the body, its pivot within extra of (px, pz)."""
     out = np.empty_like(chosen)
     k = 0
     for i in range(len(chosen)):
@@ -199,7 +199,7 @@ def _row(
     scratch: AnyArray,
     out: AnyArray,
 ) -> None:
-    """Set the bits of `out` that the chosen pairs block. work, scratch (3, words): see `touched`."""
+    """Set the bits of `out` that the chosen pairs block. work, scratch: see `touched`."""
     askew = False
     for i in range(len(chosen)):
         b, p = chosen[i, 0], chosen[i, 1]

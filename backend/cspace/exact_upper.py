@@ -63,14 +63,12 @@ def _decide(
             if g <= moved:
                 maybe = True
     if not maybe or depth == 0:
-        return maybe and not colliding
+        return bool(maybe and not colliding)
     quarter = 0.5 * half_cell
     first = _decide(own, others, pairs, radius, angle - quarter, quarter, colliding, depth - 1)
     if first != colliding:
-        return first
-    return bool(
-        _decide(own, others, pairs, radius, angle + quarter, quarter, colliding, depth - 1)
-    )
+        return bool(first)
+    return bool(_decide(own, others, pairs, radius, angle + quarter, quarter, colliding, depth - 1))
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]

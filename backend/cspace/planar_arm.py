@@ -31,7 +31,7 @@ GROUPS = ("boom", "stick", "bucket")
 class Profiles(NamedTuple):
     """Convex profiles of n bodies about their pivots, at joint values 0; arrays for the kernels.
 
-    group: (n,) 0 boom, 1 stick, 2 bucket and what it carries; slab: (n,) row of `slabs`; count:
+    group: (n,) 0 boom, 1 stick, 2 bucket and what it carries; slab: (n,) row of `slabs`; sides:
     (n,) vertices, 0 leaves a body out; radius, bearing: (n, v) polar vertices [m], [rad];
     offset, normal: (n, v) edges m . x <= offset [m], direction of m [rad]; reach: (n,) largest
     radius; depth: (n,) signed distance of the pivot to the profile, negative inside [m];
@@ -40,7 +40,7 @@ class Profiles(NamedTuple):
 
     group: IntArray
     slab: IntArray
-    count: IntArray
+    sides: IntArray
     radius: Array
     bearing: Array
     offset: Array

@@ -105,9 +105,7 @@ def slab_planes(low: float, high: float, spread: float, front: bool) -> Array:
     if spread == 0.0:
         return np.array([[0.0, 1.0, high], [0.0, -1.0, -low]])
     side = 1.0 if front else -1.0
-    return np.array(
-        [[-side, 0.0, 0.0], [-side * slope, 1.0, top], [-side * slope, -1.0, -bottom]]
-    )
+    return np.array([[-side, 0.0, 0.0], [-side * slope, 1.0, top], [-side * slope, -1.0, -bottom]])
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]

@@ -29,7 +29,7 @@ class Regions:
     def cut_off(self) -> IntArray:
         """(k,) labels of the free regions that cannot be reached from the present one."""
         every = np.arange(1, len(self.sizes) + 1)
-        return every[every != self.present]
+        return np.asarray(every[every != self.present])
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]

@@ -30,14 +30,14 @@ SLACK = 1e-12  # [m] more than rounding moves a line
 
 
 class Polygons(NamedTuple):
-    """Convex polygons in the arm's plane. body slab and obstacle: (k,); count: (k,) corners;
+    """Convex polygons in the arm's plane. body slab and obstacle: (k,); sides: (k,) corners;
     x, z: (k, v) [m]; normal_x, normal_z, offset: (k, v) edges n . x <= offset; low, high: (k, 2)
     bounding rectangles.
     """
 
     slab: IntArray
     obstacle: IntArray
-    count: IntArray
+    sides: IntArray
     x: Array
     z: Array
     normal_x: Array
@@ -113,7 +113,7 @@ def touched(
 
     Scratch: work (3, corners of the largest polygon); words (2 or more, words of out).
     """
-    edges = polygons.count[k]
+    edges = polygons.sides[k]
     inside = body.depth[b] <= 0.0
     for i in range(edges):
         c = polygons.offset[k, i] - polygons.normal_x[k, i] * px - polygons.normal_z[k, i] * pz
@@ -152,7 +152,7 @@ def _free(
 
     work[0]: offsets of the polygon's edges as seen from the pivot.
     """
-    corners, edges = body.count[b], polygons.count[k]
+    corners, edges = body.sides[b], polygons.sides[k]
     free[:] = 0
     for i in range(edges):
         c = work[0, i]
@@ -222,4 +222,4 @@ def rectangle_distance(low: Array, high: Array, px: float, pz: float) -> float:
     """Squared distance of a point to a rectangle."""
     dx = max(low[0] - px, 0.0, px - high[0])
     dz = max(low[1] - pz, 0.0, pz - high[1])
-    return dx * dx + dz * dz
+    return float(dx * dx + dz * dz)

@@ -39,7 +39,9 @@ def clip(triangles: Array, normal: Array, offset: float) -> Array:
 
 def outside_box(triangles: Array, R: Array, low: Array, high: Array) -> Array:
     """The pieces of triangles (n, 3, 3) outside the box {p: low <= R^T p <= high}, (m, 3, 3)."""
-    rest, pieces = triangles, []
+    local = triangles @ R
+    apart = ((local.min(axis=1) >= high) | (local.max(axis=1) <= low)).any(axis=1)
+    rest, pieces = triangles[~apart], [triangles[apart]]
     for axis in range(3):
         for normal, offset in ((R[:, axis], high[axis]), (-R[:, axis], -low[axis])):
             if not len(rest):
@@ -49,7 +51,7 @@ def outside_box(triangles: Array, R: Array, low: Array, high: Array) -> Array:
             if beyond.any():
                 pieces.append(clip(rest[beyond], -normal, -offset))
                 rest = np.concatenate([rest[~beyond], clip(rest[beyond], normal, offset)])
-    return np.concatenate(pieces) if pieces else triangles[:0]
+    return np.concatenate(pieces)
 
 
 def sample(triangles: Array, spacing: float) -> Array:

@@ -267,7 +267,8 @@ def search(
 
     The cost leads the search; returned are the cheapest set and those of the least excess met on
     the way.
-    `good_enough` ends it at once; else it ends after `rounds` trials, or after `patience` of them in a row without a better set.
+    `good_enough` ends it at once; else it ends after `rounds` trials, or after `patience` of them
+    in a row without a better set.
     """
     s = Search(points, distance, tolerance)
     starts = [s.start(max_boxes, 2 * max_boxes, alone) for alone in (False, True)]

@@ -10,7 +10,7 @@ import numpy as np
 
 from backend.machine.model import Machine
 from backend.spatial.boxes import Boxes
-from backend.spatial.types import Array
+from backend.spatial.types import Array, IntArray
 
 
 def link_poses(machine: Machine, q: Array, T_site_root: Array | None = None) -> Array:
@@ -110,22 +110,28 @@ def jacobian(
     p = (T_link[..., :3, :3] @ np.asarray(point, dtype=float)[..., None])[..., 0] + T_link[
         ..., :3, 3
     ]
-    return point_jacobian(machine, T, link, p, angular)
-
-
-def point_jacobian(
-    machine: Machine, T_site_links: Array, link: int, p_site: Array, angular: bool = False
-) -> Array:
-    """The same from link poses (..., L, 4, 4) and a point (..., 3) of the site [m]."""
-    J = np.zeros((*T_site_links.shape[:-3], 6 if angular else 3, len(machine.joints)))
+    J = np.zeros((*T.shape[:-3], 6 if angular else 3, len(machine.joints)))
     i = link
     while i >= 0:
         k = machine.links[i].joint
         if k >= 0:
             # The joint frame and its link share origin and axis: rotation leaves both in place.
-            z = T_site_links[..., i, :3, :3] @ machine.links[i].axis
-            J[..., :3, k] = np.cross(z, p_site - T_site_links[..., i, :3, 3])
+            z = T[..., i, :3, :3] @ machine.links[i].axis
+            J[..., :3, k] = np.cross(z, p - T[..., i, :3, 3])
             if angular:
                 J[..., 3:, k] = z
         i = machine.links[i].parent
     return J
+
+
+def body_point_jacobians(
+    machine: Machine, T_site_links: Array, bodies: IntArray, points: Array
+) -> Array:
+    """(k, 3, n) velocities [m/s] per joint rate of site points that move with bodies.
+
+    T_site_links: (L, 4, 4) of one configuration; bodies: (k,) indices; points: (k, 3) [m].
+    """
+    T = T_site_links[machine.joint_links]
+    z = np.stack([T[k, :3, :3] @ machine.links[i].axis for k, i in enumerate(machine.joint_links)])
+    J = np.cross(z[None], points[:, None] - T[None, :, :3, 3])
+    return np.swapaxes(np.where(machine.body_joints[bodies][..., None], J, 0.0), 1, 2)

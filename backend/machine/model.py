@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 
 from backend.spatial.boxes import Boxes
-from backend.spatial.types import AnyArray, Array, IntArray
+from backend.spatial.types import AnyArray, Array, BoolArray, IntArray
 
 ROLES = ("swing", "boom", "stick", "bucket", "tilt", "rotate")
 """Joint roles in the order of every joint vector; the first four are always there."""
@@ -190,6 +190,28 @@ class Machine:
     def body_link_index(self) -> IntArray:
         """(n,) body_links as an index array."""
         return np.array(self.body_links, dtype=np.int64)
+
+    @cached_property
+    def joint_links(self) -> IntArray:
+        """(n,) the link that each joint moves first."""
+        return np.array(
+            [
+                next(i for i, link in enumerate(self.links) if link.joint == k)
+                for k in range(len(self.joints))
+            ]
+        )
+
+    @cached_property
+    def body_joints(self) -> BoolArray:
+        """(bodies, n) whether a joint moves a body."""
+        moved = np.zeros((len(self.body_links), len(self.joints)), dtype=bool)
+        for body, link in enumerate(self.body_links):
+            i = link
+            while i >= 0:
+                if self.links[i].joint >= 0:
+                    moved[body, self.links[i].joint] = True
+                i = self.links[i].parent
+        return moved
 
     @cached_property
     def body_parts(self) -> AnyArray:

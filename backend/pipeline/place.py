@@ -31,8 +31,3 @@ def place(machine: Machine, q: Array, T_site_root: Array) -> Body3D:
         azimuth=float(kinematics.azimuth(machine, q, T_site_root)),
         reach=float(np.hypot(*(end_point - swing_center)[:2])),
     )
-
-
-def point_jacobian(machine: Machine, body: Body3D, index: int, point: Array) -> Array:
-    """(3, n) velocity [m/s] per joint rate of a site point (3,) that moves with body `index`."""
-    return kinematics.point_jacobian(machine, body.link_poses, machine.body_links[index], point)

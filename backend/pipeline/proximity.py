@@ -8,8 +8,8 @@ import numpy as np
 
 from backend.collision.closest import ClosePairs, closest_pairs
 from backend.fusion.pose import Validity
+from backend.machine import kinematics
 from backend.pipeline.config import Config
-from backend.pipeline.place import point_jacobian
 from backend.pipeline.records import MachineState, PairDistance
 from backend.safety.partner import Proximity
 from backend.spatial.types import Array
@@ -67,12 +67,7 @@ def _closest(
     found = closest_pairs(
         state_a.body.boxes, state_b.body.boxes, within=config.limits.slow_below + doubt
     )
-    near = []
-    nearest_closing = 0.0
-    for k in range(len(found.distance)):
-        both, closing = _both_sides(a, b, states, config, found, k, doubt)
-        nearest_closing = closing if k == 0 else nearest_closing
-        near.extend(both)
+    near, closing = _both_sides(a, b, states, config, found, doubt)
     i, j = found.index[0]
     pair = PairDistance(
         a,
@@ -84,7 +79,7 @@ def _closest(
         "",
         len(found.distance),
         near=True,
-        approach=nearest_closing,
+        approach=float(closing[0]),
     )
     return pair, near
 
@@ -95,54 +90,53 @@ def _both_sides(
     states: dict[str, MachineState],
     config: Config,
     found: ClosePairs,
-    k: int,
     doubt: float,
-) -> tuple[list[Proximity], float]:
-    """The k-th close pair seen from a and from b, and its closing speed [m/s]."""
-    distance = float(found.distance[k])
-    points = found.points[k]
-    direction = _away(points, states, a, b)
-    motion: list[tuple[Array, float, Array]] = []
+) -> tuple[list[Proximity], Array]:
+    """Every close pair seen from a and from b, and the closing speeds (k,) [m/s]."""
+    away = _away(found.points, states, a, b)
+    gradients, forward, velocities = [], [], []
     for side, (name, sign) in enumerate(((a, 1.0), (b, -1.0))):
         machine, state = config.machines[name], states[name]
         assert state.body is not None
-        J = point_jacobian(machine, state.body, int(found.index[k, side]), points[side])
-        away = sign * direction
-        forward = np.array([np.cos(state.pose.yaw), np.sin(state.pose.yaw), 0.0])
-        velocity = J @ state.pose.joint_velocities + state.pose.base_velocity
-        motion.append((away @ J, float(away @ forward), velocity))
-    closing = float(-direction @ (motion[0][2] - motion[1][2]))
-    names = [
-        f"{name}:{config.machines[name].body_names[found.index[k, side]]}"
-        for side, name in enumerate((a, b))
-    ]
-    near = [
-        Proximity(
-            own=names[side],
-            other=names[1 - side],
-            distance=distance,
-            margin=distance - doubt,
-            points=points if side == 0 else points[::-1],
-            gradient=motion[side][0],
-            travel_gradient=motion[side][1],
-            closing=closing,
+        J = kinematics.body_point_jacobians(
+            machine, state.body.link_poses, found.index[:, side], found.points[:, side]
         )
-        for side in (0, 1)
-    ]
+        ahead = np.array([np.cos(state.pose.yaw), np.sin(state.pose.yaw), 0.0])
+        gradients.append(sign * np.einsum("kx,kxn->kn", away, J))
+        forward.append(sign * away @ ahead)
+        velocities.append(J @ state.pose.joint_velocities + state.pose.base_velocity)
+    closing = -np.einsum("kx,kx->k", away, velocities[0] - velocities[1])
+    near = []
+    for k, pair in enumerate(found.index):
+        names = [
+            f"{name}:{config.machines[name].body_names[pair[side]]}"
+            for side, name in enumerate((a, b))
+        ]
+        near += [
+            Proximity(
+                own=names[side],
+                other=names[1 - side],
+                distance=float(found.distance[k]),
+                margin=float(found.distance[k]) - doubt,
+                points=found.points[k, ::-1] if side else found.points[k],
+                gradient=gradients[side][k],
+                travel_gradient=float(forward[side][k]),
+                closing=float(closing[k]),
+            )
+            for side in (0, 1)
+        ]
     return near, closing
 
 
 def _away(points: Array, states: dict[str, MachineState], a: str, b: str) -> Array:
-    """Unit vector from b's closest point to a's; between swing centres when they coincide."""
-    delta = points[0] - points[1]
-    length = float(np.linalg.norm(delta))
-    if length < 1e-9:
-        body_a, body_b = states[a].body, states[b].body
-        assert body_a is not None
-        assert body_b is not None
-        delta = body_a.swing_center - body_b.swing_center
-        length = max(float(np.linalg.norm(delta)), 1e-9)
-    return np.asarray(delta / length)
+    """Unit vectors (k, 3) from b's points to a's; between swing centres where they coincide."""
+    body_a, body_b = states[a].body, states[b].body
+    assert body_a is not None
+    assert body_b is not None
+    delta = points[:, 0] - points[:, 1]
+    apart = np.linalg.norm(delta, axis=1) > 1e-9
+    delta = np.where(apart[:, None], delta, body_a.swing_center - body_b.swing_center)
+    return np.asarray(delta / np.maximum(np.linalg.norm(delta, axis=1, keepdims=True), 1e-9))
 
 
 def _workspace_gap(a: MachineState, b: MachineState, config: Config) -> float:

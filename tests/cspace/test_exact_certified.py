@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
-from exact_scenes import NAMES, coal_touches, judged, machine_named, scene, zx200_of_boxes
+from exact_scenes import NAMES, coal_touches, judged, machine_named, scene
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -30,14 +28,9 @@ def draw(grid: JointGrid, count: int, seed: int) -> tuple[np.ndarray, np.ndarray
     return index, grid.lower + (index + share) * grid.steps
 
 
-@pytest.fixture(scope="module", params=[*NAMES, "zx200"])
-def machine(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Machine:
-    if request.param != "zx200":
-        return machine_named(request.param)
-    folder = Path(__file__).resolve().parents[3] / "shared" / "data" / "zx200"
-    if not folder.is_dir():
-        return machine_named("mini")
-    return zx200_of_boxes(folder, tmp_path_factory.mktemp("cache"))
+@pytest.fixture(scope="module", params=NAMES)
+def machine(request: pytest.FixtureRequest) -> Machine:
+    return machine_named(request.param)
 
 
 def test_no_certificate_is_wrong(machine: Machine) -> None:
@@ -51,7 +44,7 @@ def test_no_certificate_is_wrong(machine: Machine) -> None:
     touched = np.logical_or(*judged(machine, q, obstacles))
     assert not (free & touched).any()
     assert not (colliding & ~touched).any()
-    grown, _ = judged(machine, q[free], obstacles, eta)
+    grown, _ = judged(machine, q[free][:4000], obstacles, eta)
     assert not grown.any()
     assert free.mean() > 0.05
     assert colliding.mean() > 0.005

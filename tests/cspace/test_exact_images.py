@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
-from exact_scenes import NAMES, coal_touches, judged, machine_named, scene, zx200_of_boxes
+from exact_scenes import NAMES, coal_touches, judged, machine_named, scene
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -29,14 +28,9 @@ def centers(grid: exact.JointGrid, index: np.ndarray) -> np.ndarray:
     return np.stack([grid.centers(k)[index[:, k]] for k in range(4)], axis=1)
 
 
-@pytest.fixture(scope="module", params=[*NAMES, "zx200"])
-def machine(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Machine:
-    if request.param != "zx200":
-        return machine_named(request.param)
-    folder = Path(__file__).resolve().parents[3] / "shared" / "data" / "zx200"
-    if not folder.is_dir():
-        return machine_named("mini")
-    return zx200_of_boxes(folder, tmp_path_factory.mktemp("cache"))
+@pytest.fixture(scope="module", params=NAMES)
+def machine(request: pytest.FixtureRequest) -> Machine:
+    return machine_named(request.param)
 
 
 def test_image_is_what_separating_axes_say_at_every_centre(machine: Machine) -> None:

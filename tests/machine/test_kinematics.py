@@ -155,3 +155,19 @@ def test_outlines_hold_every_corner_and_turn_counter_clockwise(machine, draw):
         to_corner = corners[:, None, :2] - outline[None]
         left = edges[:, 0] * to_corner[..., 1] - edges[:, 1] * to_corner[..., 0]
         assert (left >= -1e-9).all()
+
+
+def test_jacobians_of_body_points_are_those_of_their_links() -> None:
+    rng = np.random.default_rng(11)
+    machine = load_machine("ex13")
+    q = rng.uniform(-0.4, 0.4, len(machine.joints))
+    T = transform.make(rotation.from_attitude(0.4, 0.1, -0.2), np.array([3.0, -2.0, 0.5]))
+    poses = kinematics.link_poses(machine, q, T)
+    bodies = np.arange(len(machine.bodies))
+    points = kinematics.body_boxes(machine, poses).corners()[:, 3]
+    together = kinematics.body_point_jacobians(machine, poses, bodies, points)
+    for body, point in zip(bodies, points, strict=True):
+        link = machine.body_links[body]
+        local = transform.apply(transform.inverse(poses[link]), point[None])[0]
+        alone = kinematics.jacobian(machine, q, T, link, local)
+        np.testing.assert_allclose(together[body], alone, atol=1e-12)
