@@ -13,7 +13,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from backend.cspace.exact_kernel import EXACT, INNER, OUTER, Cells, Chain, image_kernel
+from backend.cspace.exact_kernel import Chain, image_kernel
+from backend.cspace.exact_slices import EXACT, INNER, OUTER, Cells
 from backend.cspace.exact_upper import touching_swings
 from backend.cspace.planar_arm import PlanarArm, Profiles, planar_arm
 from backend.cspace.rows import Row

@@ -1,8 +1,9 @@
 """The image kernel: for each swing the boom's row, for each boom the stick's, for each stick the
 bucket's, all against the polygons of that swing.
 
-What a link touches blocks everything further out, so most of the image is written in whole blocks.
-The same kernel makes the exact image and both bounds of the certified one; `Cells` says which.
+What a link touches blocks everything further out, so most of the image is written in whole blocks;
+and a block of boom and stick cells that no bucket body reaches is left as it is. The same kernel
+makes the exact image and both bounds of the certified one; `Cells` says which.
 """
 
 from __future__ import annotations
@@ -14,16 +15,10 @@ import numpy as np
 from numba import njit
 
 from backend.cspace.exact_boxes import gap
+from backend.cspace.exact_slices import EXACT, ROUNDING, Cells, placed, slices
 from backend.cspace.planar_arm import Profiles
-from backend.cspace.planar_slices import POINTS, inner_slice, outer_slice
 from backend.cspace.rows import ALL, Polygons, Row, rectangle_distance, touched
 from backend.spatial.types import AnyArray, Array, BoolArray, IntArray
-
-EXACT, OUTER, INNER = 0, 1, -1
-ROUNDING = 1e-9
-"""[m], [rad]: certified bounds are moved outward by more than the kernels round."""
-
-_BLOCK = 8  # stick cells that are asked about together first
 
 
 class Chain(NamedTuple):
@@ -41,114 +36,6 @@ class Chain(NamedTuple):
     askew: BoolArray
 
 
-class Cells(NamedTuple):
-    """The grid. boom, stick, bucket: rows of cell centres in the arm's plane.
-
-    kind: EXACT at the centres; OUTER all that is not surely free; INNER only what is surely
-    blocked; halves: (4,) half a cell of swing, boom, stick, bucket [rad], 0 where the value is
-    exact.
-    """
-
-    boom: Row
-    stick: Row
-    bucket: Row
-    kind: int
-    halves: Array
-
-
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _slices(
-    body: Profiles,
-    boxes: tuple[Array, Array, Array],
-    pairs: BoolArray,
-    cells: Cells,
-    pivot: Array,
-    reach: float,
-) -> Polygons:
-    """Polygons of all obstacles that the arm can meet, for every slab that needs them."""
-    centers, rotations, halves = boxes
-    m, slabs = len(centers), len(body.slabs)
-    spread, kind = cells.halves[0], cells.kind
-    pad = ROUNDING * kind
-    wide = max(abs(body.slabs.min()), abs(body.slabs.max())) + abs(pad)
-    wanted = np.zeros((slabs, m), np.bool_)
-    for j in range(m):
-        size = math.sqrt(halves[j, 0] ** 2 + halves[j, 1] ** 2 + halves[j, 2] ** 2) + 1e-6
-        x, t, z = centers[j, 0], centers[j, 1], centers[j, 2]
-        beside = abs(t) * math.cos(spread) - abs(x) * math.sin(spread) - size
-        # The swing moves a point on a circle about z: its distance from the pivot is at least
-        # that of the nearest point of the circle.
-        away = math.hypot(max(abs(math.hypot(x, t) - abs(pivot[0])) - wide, 0.0), z - pivot[1])
-        if beside > wide or away - size > reach + wide:
-            continue
-        for b in range(len(body.group)):
-            if body.sides[b] > 0 and pairs[b, j]:
-                wanted[body.slab[b], j] = True
-    room = 0
-    for s in range(slabs):
-        for j in range(m):
-            if wanted[s, j]:
-                room += 2 if kind == OUTER and spread > 0.0 else 1
-    slab, obstacle = np.empty(room, np.int64), np.empty(room, np.int64)
-    count = np.zeros(room, np.int64)
-    xs, zs = np.empty((room, POINTS)), np.empty((room, POINTS))
-    corners, work = np.empty((8, 3)), np.empty((2, 12, 3))
-    points = np.empty((POINTS, 3))
-    k = 0
-    for j in range(m):
-        made = False
-        for s in range(slabs):
-            if not wanted[s, j]:
-                continue
-            if not made:
-                made = True
-                for v in range(8):
-                    for i in range(3):
-                        corners[v, i] = centers[j, i]
-                        for a in range(3):
-                            half = halves[j, a] if (v >> a) & 1 else -halves[j, a]
-                            corners[v, i] += half * rotations[j, i, a]
-            low, high = body.slabs[s, 0] - pad, body.slabs[s, 1] + pad
-            if kind == INNER and spread > 0.0:
-                n = inner_slice(corners, low, high, spread, points, work, xs[k], zs[k])
-                if n >= 3:
-                    slab[k], obstacle[k], count[k] = s, j, n
-                    k += 1
-                continue
-            for front in (True, False):
-                n = outer_slice(corners, low, high, spread, front, points, work, xs[k], zs[k])
-                if n > 0:
-                    slab[k], obstacle[k], count[k] = s, j, n
-                    k += 1
-                if spread == 0.0:
-                    break
-    widest = 1
-    for i in range(k):
-        widest = max(widest, count[i])
-    normal_x, normal_z = np.zeros((k, widest)), np.zeros((k, widest))
-    offset, low_corner, high_corner = np.zeros((k, widest)), np.empty((k, 2)), np.empty((k, 2))
-    for i in range(k):
-        n = count[i]
-        low_corner[i, 0], high_corner[i, 0] = xs[i, :n].min(), xs[i, :n].max()
-        low_corner[i, 1], high_corner[i, 1] = zs[i, :n].min(), zs[i, :n].max()
-        for v in range(n):
-            u = v + 1 if v + 1 < n else 0
-            dx, dz = xs[i, u] - xs[i, v], zs[i, u] - zs[i, v]
-            length = math.hypot(dx, dz)
-            if length > 0.0:
-                normal_x[i, v], normal_z[i, v] = dz / length, -dx / length
-            else:
-                normal_x[i, v] = 1.0
-            offset[i, v] = -math.inf
-            for w in range(n):
-                reached = normal_x[i, v] * xs[i, w] + normal_z[i, v] * zs[i, w]
-                offset[i, v] = max(offset[i, v], reached)
-    return Polygons(
-        slab[:k], obstacle[:k], count[:k], xs[:k, :widest].copy(), zs[:k, :widest].copy(),
-        normal_x, normal_z, offset, low_corner, high_corner,
-    )  # fmt: skip
-
-
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _pairs_of(body: Profiles, polygons: Polygons, pairs: BoolArray, group: int) -> IntArray:
     """(k, 2) bodies of the group and the polygons in their slabs that they must not touch."""
@@ -161,22 +48,6 @@ def _pairs_of(body: Profiles, polygons: Polygons, pairs: BoolArray, group: int) 
             if polygons.slab[p] == body.slab[b] and pairs[b, polygons.obstacle[p]]:
                 out[k, 0], out[k, 1] = b, p
                 k += 1
-    return out[:k]
-
-
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _near(
-    chosen: IntArray, body: Profiles, polygons: Polygons, px: float, pz: float, extra: float
-) -> IntArray:
-    """The pairs whose polygon is within reach of the body, its pivot within extra of (px, pz)."""
-    out = np.empty_like(chosen)
-    k = 0
-    for i in range(len(chosen)):
-        b, p = chosen[i, 0], chosen[i, 1]
-        within = body.reach[b] + extra
-        if rectangle_distance(polygons.low[p], polygons.high[p], px, pz) <= within * within:
-            out[k, 0], out[k, 1] = b, p
-            k += 1
     return out[:k]
 
 
@@ -210,7 +81,7 @@ def _row(
         if rectangle_distance(polygons.low[p], polygons.high[p], px, pz) > within * within:
             continue
         touched(
-            body, b, polygons, p, px, pz, row, margin, turn, work, scratch, out
+            body, b, polygons, p, px, pz, row, margin, turn, full, work, scratch, out
         )  # fmt: skip
         done = True
         for w in range(len(out)):
@@ -229,7 +100,7 @@ def _row(
             continue
         maybe = scratch[2]
         maybe[:] = 0
-        touched(body, b, polygons, p, px, pz, row, 0.0, 0.0, work, scratch, maybe)
+        touched(body, b, polygons, p, px, pz, row, 0.0, 0.0, full, work, scratch, maybe)
         for w in range(len(out)):
             rest = maybe[w] & full[w] & ~out[w]
             for bit in range(64):
@@ -269,21 +140,6 @@ def _box_touches(
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _placed(boxes: tuple[Array, Array, Array], T: Array) -> tuple[Array, Array, Array]:
-    """The obstacles in the frame `arm`. T: (3, 4)."""
-    m = len(boxes[0])
-    centers, rotations = np.empty((m, 3)), np.zeros((m, 3, 3))
-    for j in range(m):
-        for i in range(3):
-            centers[j, i] = T[i, 3]
-            for k in range(3):
-                centers[j, i] += T[i, k] * boxes[0][j, k]
-                for a in range(3):
-                    rotations[j, i, a] += T[i, k] * boxes[1][j, k, a]
-    return centers, rotations, boxes[2]
-
-
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _full(n: int) -> AnyArray:
     """Words with the first n bits set."""
     words = (n + 63) // 64
@@ -291,102 +147,6 @@ def _full(n: int) -> AnyArray:
     if n % 64:
         out[words - 1] = ALL >> np.uint64(64 - n % 64)
     return out
-
-
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _swing_block(
-    chain: Chain,
-    body: Profiles,
-    obstacles: tuple[Array, Array, Array],
-    pairs: BoolArray,
-    T: Array,
-    cells: Cells,
-    out: AnyArray,
-) -> None:
-    """One swing of the image. out: (boom, stick, words)."""
-    kind, sign = cells.kind, float(cells.kind)
-    l1 = math.hypot(chain.boom[0], chain.boom[1])
-    l2 = math.hypot(chain.stick[0], chain.stick[1])
-    far = np.zeros(3)
-    for b in range(len(body.group)):
-        far[body.group[b]] = max(far[body.group[b]], body.reach[b])
-    reach = max(far[0], l1 + far[1], l1 + l2 + far[2])
-    boxes = _placed(obstacles, T)
-    polygons = _slices(body, boxes, pairs, cells, chain.pivot, reach)
-    if len(polygons.slab) == 0:
-        return
-    boom_pairs = _pairs_of(body, polygons, pairs, 0)
-    stick_pairs = _pairs_of(body, polygons, pairs, 1)
-    bucket_pairs = _pairs_of(body, polygons, pairs, 2)
-    turn_boom = cells.halves[1]
-    turn_stick = turn_boom + cells.halves[2]
-    turn_bucket = turn_stick + cells.halves[3]
-    pad = ROUNDING if kind != EXACT else 0.0
-
-    full1, full2, full3 = _full(cells.boom.n), _full(cells.stick.n), _full(cells.bucket.n)
-    work = np.empty((3, polygons.x.shape[1]))
-    scratch1 = np.empty((3, len(full1)), np.uint64)
-    scratch2 = np.empty((3, len(full2)), np.uint64)
-    scratch3 = np.empty((3, len(full3)), np.uint64)
-    blocked1, blocked2 = np.zeros(len(full1), np.uint64), np.zeros(len(full2), np.uint64)
-    needed, count = np.empty((len(bucket_pairs), 2), np.int64), 0
-    px, pz = chain.pivot[0], chain.pivot[1]
-    _row(
-        boom_pairs, chain, 0, body, polygons, boxes, px, pz, cells.boom,
-        sign * pad, sign * (turn_boom + pad), kind, full1, work, scratch1, blocked1,
-    )  # fmt: skip
-    for i in range(cells.boom.n):
-        if (blocked1[i // 64] >> np.uint64(i % 64)) & np.uint64(1):
-            out[i, :, :] = full3
-            continue
-        angle1 = cells.boom.start + i * cells.boom.step
-        c, s = math.cos(angle1), math.sin(angle1)
-        qx = px + c * chain.boom[0] - s * chain.boom[1]
-        qz = pz + s * chain.boom[0] + c * chain.boom[1]
-        # The stick's pivot is at most this far from where it is at the boom cell's centre.
-        margin = l1 * turn_boom + pad
-        row2 = Row(cells.stick.start + angle1, cells.stick.step, cells.stick.n)
-        blocked2[:] = 0
-        _row(
-            stick_pairs, chain, 1, body, polygons, boxes, qx, qz, row2,
-            sign * margin, sign * (turn_stick + pad), kind, full2, work, scratch2, blocked2,
-        )  # fmt: skip
-        most = l2 + (l1 + 2.0 * l2) * turn_boom + l2 * cells.halves[2] + pad
-        near = _near(bucket_pairs, body, polygons, qx, qz, most)
-        count = 0
-        for k in range(cells.stick.n):
-            if k % _BLOCK == 0 and len(near) > 0:
-                # What is free of a pair for a whole block of stick cells need not be asked again.
-                size = min(_BLOCK, cells.stick.n - k)
-                angle2 = row2.start + (k + 0.5 * (size - 1)) * row2.step
-                span = 0.5 * (size - 1) * abs(row2.step)
-                c, s = math.cos(angle2), math.sin(angle2)
-                rx = qx + c * chain.stick[0] - s * chain.stick[1]
-                rz = qz + s * chain.stick[0] + c * chain.stick[1]
-                moved = l2 * (cells.halves[2] + span)
-                lever = math.hypot(rx - px, rz - pz) + moved
-                row3 = Row(cells.bucket.start + angle2, cells.bucket.step, cells.bucket.n)
-                count = _needed(
-                    near, body, polygons, rx, rz, row3, lever * turn_boom + moved + ROUNDING,
-                    turn_bucket + span + ROUNDING, full3, work, scratch3, needed,
-                )  # fmt: skip
-            if (blocked2[k // 64] >> np.uint64(k % 64)) & np.uint64(1):
-                out[i, k, :] = full3
-                continue
-            if count == 0:
-                continue
-            angle2 = row2.start + k * row2.step
-            c, s = math.cos(angle2), math.sin(angle2)
-            rx = qx + c * chain.stick[0] - s * chain.stick[1]
-            rz = qz + s * chain.stick[0] + c * chain.stick[1]
-            # Boom turns the bucket's pivot about the boom's, stick about its own.
-            lever = math.hypot(rx - px, rz - pz) + l2 * cells.halves[2]
-            margin = lever * turn_boom + l2 * cells.halves[2] + pad
-            row3 = Row(cells.bucket.start + angle2, cells.bucket.step, cells.bucket.n)
-            _row(
-                needed[:count], chain, 2, body, polygons, boxes, rx, rz, row3,
-                sign * margin, sign * (turn_bucket + pad), kind, full3, work, scratch3, out[i, k],
-            )  # fmt: skip
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
@@ -413,14 +173,162 @@ def _needed(
         if rectangle_distance(polygons.low[p], polygons.high[p], px, pz) > within * within:
             continue
         maybe[:] = 0
-        touched(body, b, polygons, p, px, pz, row, margin, turn, work, scratch, maybe)
-        some = False
+        touched(body, b, polygons, p, px, pz, row, margin, turn, full, work, scratch, maybe)
         for w in range(len(full)):
-            some = some or (maybe[w] & full[w]) != 0
-        if some:
-            out[count, 0], out[count, 1] = b, p
-            count += 1
+            if maybe[w] & full[w]:
+                out[count, 0], out[count, 1] = b, p
+                count += 1
+                break
     return count
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _bucket_rows(
+    chain: Chain,
+    body: Profiles,
+    polygons: Polygons,
+    boxes: tuple[Array, Array, Array],
+    cells: Cells,
+    pairs: IntArray,
+    full: AnyArray,
+    work: Array,
+    blocked: BoolArray,
+    out: AnyArray,
+) -> None:
+    """Fill the bucket's rows: blocks of boom and stick cells, halved as long as a pair may touch.
+
+    pairs: (k, 2) bodies and polygons; blocked: (boom, stick) rows that are full already; out:
+    (boom, stick, words).
+    """
+    levels = 2
+    while 1 << (levels - 2) < cells.boom.n * cells.stick.n:
+        levels += 1
+    # The pairs that matter to the halves of a block at one level stand at the next.
+    lists = np.empty((2 * levels + 1, len(pairs), 2), np.int64)
+    counts = np.zeros(2 * levels + 1, np.int64)
+    lists[0], counts[0] = pairs, len(pairs)
+    stack = np.empty((4 * levels, 5), np.int64)
+    stack[0, 0], stack[0, 1], stack[0, 2], stack[0, 3] = 0, cells.boom.n, 0, cells.stick.n
+    stack[0, 4] = 0
+    size = 1
+    scratch = np.empty((3, len(full)), np.uint64)
+    reach = math.hypot(chain.stick[0], chain.stick[1])
+    pad, sign = 0.0 if cells.kind == EXACT else ROUNDING, float(cells.kind)
+    while size > 0:
+        size -= 1
+        first1, n1, first2, n2 = stack[size, 0], stack[size, 1], stack[size, 2], stack[size, 3]
+        level = stack[size, 4]
+        single = n1 == 1 and n2 == 1
+        if single and blocked[first1, first2]:
+            continue
+        angle1 = cells.boom.start + (first1 + 0.5 * (n1 - 1)) * cells.boom.step
+        angle2 = angle1 + cells.stick.start + (first2 + 0.5 * (n2 - 1)) * cells.stick.step
+        c1, s1, c2, s2 = math.cos(angle1), math.sin(angle1), math.cos(angle2), math.sin(angle2)
+        dx = c1 * chain.boom[0] - s1 * chain.boom[1] + c2 * chain.stick[0] - s2 * chain.stick[1]
+        dz = s1 * chain.boom[0] + c1 * chain.boom[1] + s2 * chain.stick[0] + c2 * chain.stick[1]
+        px, pz = chain.pivot[0] + dx, chain.pivot[1] + dz
+        row = Row(cells.bucket.start + angle2, cells.bucket.step, cells.bucket.n)
+        # The boom turns the bucket's pivot about the boom's, the stick about its own.
+        half1 = cells.halves[1] + 0.5 * (n1 - 1) * abs(cells.boom.step)
+        half2 = cells.halves[2] + 0.5 * (n2 - 1) * abs(cells.stick.step)
+        moved = reach * half2
+        margin = (math.hypot(dx, dz) + moved) * half1 + moved
+        turn = half1 + half2 + cells.halves[3]
+        chosen = lists[level, : counts[level]]
+        if single:
+            _row(
+                chosen, chain, 2, body, polygons, boxes, px, pz, row, sign * (margin + pad),
+                sign * (turn + pad), cells.kind, full, work, scratch, out[first1, first2],
+            )  # fmt: skip
+            continue
+        # To ask at every halving costs more than it saves: it is done for blocks of 8, 64, ...
+        halvings = 0
+        while 1 << halvings < n1 * n2:
+            halvings += 1
+        if halvings % 3 == 0:
+            counts[level + 1] = _needed(
+                chosen, body, polygons, px, pz, row, margin + ROUNDING, turn + ROUNDING, full,
+                work, scratch, lists[level + 1],
+            )  # fmt: skip
+            level += 1
+            if counts[level] == 0:
+                continue
+        for part in range(2):
+            stack[size, 0], stack[size, 1] = first1, n1
+            stack[size, 2], stack[size, 3] = first2, n2
+            stack[size, 4] = level
+            longer = 0 if n1 >= n2 else 2
+            whole = max(n1, n2)
+            half = whole // 2
+            if part == 1:
+                stack[size, longer] += half
+            stack[size, longer + 1] = whole - half if part == 1 else half
+            size += 1
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _swing_block(
+    chain: Chain,
+    body: Profiles,
+    obstacles: tuple[Array, Array, Array],
+    pairs: BoolArray,
+    T: Array,
+    cells: Cells,
+    out: AnyArray,
+) -> None:
+    """One swing of the image. out: (boom, stick, words)."""
+    kind, sign = cells.kind, float(cells.kind)
+    l1 = math.hypot(chain.boom[0], chain.boom[1])
+    l2 = math.hypot(chain.stick[0], chain.stick[1])
+    far = np.zeros(3)
+    for b in range(len(body.group)):
+        far[body.group[b]] = max(far[body.group[b]], body.reach[b])
+    reach = max(far[0], l1 + far[1], l1 + l2 + far[2])
+    boxes = placed(obstacles, T)
+    polygons = slices(body, boxes, pairs, cells.kind, cells.halves[0], chain.pivot, reach)
+    if len(polygons.slab) == 0:
+        return
+    boom_pairs = _pairs_of(body, polygons, pairs, 0)
+    stick_pairs = _pairs_of(body, polygons, pairs, 1)
+    bucket_pairs = _pairs_of(body, polygons, pairs, 2)
+    pad = ROUNDING if kind != EXACT else 0.0
+
+    full1, full2, full3 = _full(cells.boom.n), _full(cells.stick.n), _full(cells.bucket.n)
+    work = np.empty((3, polygons.x.shape[1]))
+    scratch1 = np.empty((3, len(full1)), np.uint64)
+    scratch2 = np.empty((3, len(full2)), np.uint64)
+    row1, row2 = np.zeros(len(full1), np.uint64), np.zeros(len(full2), np.uint64)
+    blocked = np.zeros((cells.boom.n, cells.stick.n), np.bool_)
+    px, pz = chain.pivot[0], chain.pivot[1]
+    _row(
+        boom_pairs, chain, 0, body, polygons, boxes, px, pz, cells.boom, sign * pad,
+        sign * (cells.halves[1] + pad), kind, full1, work, scratch1, row1,
+    )  # fmt: skip
+    for i in range(cells.boom.n):
+        if (row1[i // 64] >> np.uint64(i % 64)) & np.uint64(1):
+            out[i, :, :] = full3
+            blocked[i] = True
+            continue
+        if len(stick_pairs) == 0:
+            continue
+        angle = cells.boom.start + i * cells.boom.step
+        c, s = math.cos(angle), math.sin(angle)
+        qx = px + c * chain.boom[0] - s * chain.boom[1]
+        qz = pz + s * chain.boom[0] + c * chain.boom[1]
+        row2[:] = 0
+        _row(
+            stick_pairs, chain, 1, body, polygons, boxes, qx, qz,
+            Row(cells.stick.start + angle, cells.stick.step, cells.stick.n),
+            sign * (l1 * cells.halves[1] + pad), sign * (cells.halves[1] + cells.halves[2] + pad),
+            kind, full2, work, scratch2, row2,
+        )  # fmt: skip
+        for k in range(cells.stick.n):
+            if (row2[k // 64] >> np.uint64(k % 64)) & np.uint64(1):
+                out[i, k, :] = full3
+                blocked[i, k] = True
+    _bucket_rows(
+        chain, body, polygons, boxes, cells, bucket_pairs, full3, work, blocked, out
+    )  # fmt: skip
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]

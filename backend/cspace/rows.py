@@ -31,7 +31,8 @@ SLACK = 1e-12  # [m] more than rounding moves a line
 
 class Polygons(NamedTuple):
     """Convex polygons in the arm's plane. body slab and obstacle: (k,); sides: (k,) corners;
-    x, z: (k, v) [m]; normal_x, normal_z, offset: (k, v) edges n . x <= offset; low, high: (k, 2)
+    x, z: (k, v) [m]; normal_x, normal_z, offset: (k, v) edges n . x <= offset; bearing: (k, v)
+    of n [rad]; low, high: (k, 2)
     bounding rectangles.
     """
 
@@ -43,6 +44,7 @@ class Polygons(NamedTuple):
     normal_x: Array
     normal_z: Array
     offset: Array
+    bearing: Array
     low: Array
     high: Array
 
@@ -105,13 +107,15 @@ def touched(
     row: Row,
     margin: float,
     turn: float,
+    full: AnyArray,
     work: Array,
     words: AnyArray,
     out: AnyArray,
 ) -> None:
     """Set the bits of `out` where body b with its pivot at (px, pz) is not apart from polygon k.
 
-    Scratch: work (3, corners of the largest polygon); words (2 or more, words of out).
+    full: the words of a row with all its cells set. Scratch: work (3, corners of the largest
+    polygon); words (2 or more, words of out).
     """
     edges = polygons.sides[k]
     inside = body.depth[b] <= 0.0
@@ -126,8 +130,8 @@ def touched(
         out[:] = ALL
         return
     free, mask = words[0], words[1]
-    if not _free(body, b, polygons, k, px, pz, row, margin, turn, False, work, free, mask):
-        _free(body, b, polygons, k, px, pz, row, margin, turn, True, work, free, mask)
+    if not _free(body, b, polygons, k, px, pz, row, margin, turn, False, full, work, free, mask):
+        _free(body, b, polygons, k, px, pz, row, margin, turn, True, full, work, free, mask)
     for w in range(len(out)):
         out[w] |= ~free[w]
 
@@ -144,6 +148,7 @@ def _free(
     margin: float,
     turn: float,
     exact: bool,
+    full: AnyArray,
     work: Array,
     free: AnyArray,
     mask: AnyArray,
@@ -158,7 +163,7 @@ def _free(
         c = work[0, i]
         if c >= body.depth[b] + SLACK:
             continue
-        normal = bearing(polygons.normal_x[k, i], polygons.normal_z[k, i], exact)
+        normal = polygons.bearing[k, i]
         mask[:] = ALL
         for v in range(corners):
             r = body.radius[b, v]
@@ -172,14 +177,24 @@ def _free(
                 normal - body.bearing[b, v], half, row, True, exact, mask
             ):
                 return False
+        done = True
         for w in range(len(free)):
             free[w] |= mask[w]
+            done = done and free[w] & full[w] == full[w]
+        if done:
+            return True
     nearest = math.inf
     for v in range(edges):
         x, z = polygons.x[k, v] - px, polygons.z[k, v] - pz
         work[1, v] = math.sqrt(x * x + z * z)
-        work[2, v] = bearing(x, z, exact)
         nearest = min(nearest, work[1, v])
+    least = math.inf
+    for j in range(corners):
+        least = min(least, body.offset[b, j] + margin)
+    if least >= nearest:
+        return True
+    for v in range(edges):
+        work[2, v] = bearing(polygons.x[k, v] - px, polygons.z[k, v] - pz, exact)
     for j in range(corners):
         e = body.offset[b, j] + margin
         if e >= nearest:

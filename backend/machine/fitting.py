@@ -19,7 +19,7 @@ from backend.spatial.boxes import Boxes
 from backend.spatial.types import Array
 
 PAD = 7e-4  # [m] on every side: rounding, and the arc between two samples of a cylinder's sweep
-_SLACK = 0.045  # [m] the search aims this much below max_excess: grid, sampling, final growth
+_SLACK = 0.03  # [m] the search aims this much below max_excess: grid, sampling, final growth
 
 
 def fit_boxes(

@@ -19,7 +19,7 @@ from backend.spatial.rotation import about_axis
 from backend.spatial.types import Array, BoolArray, IntArray
 
 VOLUME = 1e-6  # cost of a cubic metre: among sets that exceed the mesh alike, the smaller
-KEPT = 10  # sets looked at closely in the end
+KEPT = 6  # sets looked at closely in the end
 _ANGLES: Array = np.radians(np.arange(0.0, 90.0, 3.0))
 _NONE: IntArray = np.zeros(0, dtype=np.int64)
 
@@ -288,8 +288,10 @@ def search(
             trial = s.turned(s.shrunk(trial)) if r % 4 == 3 else s.shrunk(trial)
             value = s.cost(trial)
         if value < 1.3 * least + 1e-12:
-            met.append((s.worst(trial), r, trial))
-            if met[-1][0] < tolerance + 0.05 and good_enough(trial):
+            worst = s.worst(trial)
+            nearest = min(m[0] for m in met)
+            met.append((worst, r, trial))
+            if worst < tolerance + 0.05 and worst < nearest + 1e-3 and good_enough(trial):
                 return [trial]
         if value < least - 1e-12:
             pieces, least, last_gain = trial, value, r

@@ -35,9 +35,11 @@ def test_each_panel_draws_what_the_snapshot_says(
     watched.until(
         "JSON.parse(document.getElementById('reach').dataset.state).hollow === false"
         " && JSON.parse(document.getElementById('trends').dataset.state).points > 3"
+        " && JSON.parse(document.getElementById('plan').dataset.state).nearest !== null"
+        " && window.cockpit.state.snapshot.pairs[0].distance !== null"
     )
     drawn = watched.canvases()
-    snapshot = still.get("/api/snapshot")
+    snapshot = watched.snapshot()
     machine = snapshot["machines"]["b"]
     plan = drawn["plan"]["state"]
     np.testing.assert_allclose(plan["base"], machine["position"][:2], atol=0.1)
@@ -58,7 +60,8 @@ def test_each_panel_draws_what_the_snapshot_says(
         state = drawn[f"slice-{index}"]["state"]
         assert state["kind"] == "projection"
         assert state["cells"] > 100
-        np.testing.assert_allclose(state["star"], [angles[x], angles[y]], atol=1.0)
+        star = np.rad2deg(state["star"])
+        np.testing.assert_allclose(star, [angles[x], angles[y]], atol=1.0)
     bars = drawn["bars"]["state"]["joints"]
     for role, value in angles.items():
         assert (bars[role] - value + 180) % 360 - 180 == pytest.approx(0.0, abs=1.0)

@@ -104,11 +104,11 @@ def judged(
 
     for start in range(0, len(q), 2000):
         k = np.arange(start, min(start + 2000, len(q)))
-        c, i, j = (g.ravel() for g in np.meshgrid(k, range(n), range(m), indexing="ij"))
+        c, i, j = (g.ravel() for g in np.meshgrid(k, np.arange(n), np.arange(m), indexing="ij"))
         mark(0, c, i, obstacles.centers[j], obstacles.rotations[j], obstacles.half_extents[j])
         if machine.self_pairs:
             pairs = np.array(machine.self_pairs)
-            c, p = (g.ravel() for g in np.meshgrid(k, range(len(pairs)), indexing="ij"))
+            c, p = (g.ravel() for g in np.meshgrid(k, np.arange(len(pairs)), indexing="ij"))
             i, j = pairs[p, 0], pairs[p, 1]
             mark(1, c, i, centers[c, j], rotations[c, j], own.half_extents[j])
     return hits[0], hits[1]
