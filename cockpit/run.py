@@ -30,7 +30,9 @@ def run_demo(
     endpoint = with_port(LOOPBACK)
     began = [float("inf")]
     station = Station(
-        site, Options(host, port, (endpoint,), (), (), "DEMO"), demo_began=lambda: began[0]
+        site,
+        Options(host, port, (endpoint,), (), (), "DEMO"),
+        demo_began=(lambda: began[0]) if tells_a_story(site) else None,
     )
     with contextlib.closing(station):
         began[0] = time.time() + SETTLE
@@ -48,6 +50,11 @@ def run_demo(
                             f"--connect {endpoint} --start-at {began[0]:.3f}",
                             flush=True,
                         )
+
+
+def tells_a_story(site: Site) -> bool:
+    """Whether the site's machines act out a scripted first minute, which the page explains."""
+    return any("script" in machine.sim.details for machine in site.machines)
 
 
 def run_serve(

@@ -40,6 +40,13 @@ class Watched:
         found: dict[str, Any] = self.page.evaluate(STATES, CANVASES)
         return found
 
+    def both(self) -> tuple[dict[str, Any], dict[str, Any]]:
+        """Canvases and snapshot of one moment."""
+        canvases, snapshot = self.page.evaluate(
+            f"ids => [({STATES})(ids), window.cockpit.state.snapshot]", CANVASES
+        )
+        return canvases, snapshot
+
     def snapshot(self) -> dict[str, Any]:
         found: dict[str, Any] = self.page.evaluate("window.cockpit.state.snapshot")
         return found

@@ -46,29 +46,38 @@ def _decide(
     """With `colliding`: whether some pair surely touches at every angle of the cell. Without:
     whether some pair may touch at some angle.
     """
-    chord = 2.0 * math.sin(0.5 * min(half_cell, math.pi))
-    maybe = False
-    for i in range(len(own[0])):
-        # No point of the body moves farther than this within the cell.
-        moved = radius[i] * chord + _PAD
-        for j in range(len(others[0])):
-            if not pairs[i, j]:
-                continue
-            g = _turned_gap(
-                own[0][i], own[1][i], own[2][i], others[0][j], others[1][j], others[2][j],
-                angle, moved,
-            )  # fmt: skip
-            if g < -moved:
-                return True
-            if g <= moved:
-                maybe = True
-    if not maybe or depth == 0:
-        return bool(maybe and not colliding)
-    quarter = 0.5 * half_cell
-    first = _decide(own, others, pairs, radius, angle - quarter, quarter, colliding, depth - 1)
-    if first != colliding:
-        return bool(first)
-    return bool(_decide(own, others, pairs, radius, angle + quarter, quarter, colliding, depth - 1))
+    stack = np.empty((depth + 2, 3))
+    stack[0, 0], stack[0, 1], stack[0, 2] = angle, half_cell, depth
+    size = 1
+    while size > 0:
+        size -= 1
+        middle, half, left = stack[size, 0], stack[size, 1], stack[size, 2]
+        # No point of a body moves farther than its radius times this within the part.
+        chord = 2.0 * math.sin(0.5 * min(half, math.pi))
+        sure, maybe = False, False
+        for i in range(len(own[0])):
+            moved = radius[i] * chord + _PAD
+            for j in range(len(others[0])):
+                if sure or not pairs[i, j]:
+                    continue
+                g = _turned_gap(
+                    own[0][i], own[1][i], own[2][i], others[0][j], others[1][j], others[2][j],
+                    middle, moved,
+                )  # fmt: skip
+                sure = sure or g < -moved
+                maybe = maybe or g <= moved
+        if sure or not maybe:
+            # One part settles it, unless it is what every part must be.
+            if sure != colliding:
+                return not colliding
+            continue
+        if left == 0.0:
+            return not colliding
+        for side in (-0.5, 0.5):
+            stack[size, 0], stack[size, 1] = middle + side * half, 0.5 * half
+            stack[size, 2] = left - 1.0
+            size += 1
+    return colliding
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]

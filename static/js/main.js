@@ -120,7 +120,7 @@ function tick() {
   const m = machine(state.own);
   heads.scene.who(state.site ? `${names().length} machines` : "");
   heads.plan.who(`${subject}`);
-  heads.reach.who(`${subject}${Number.isFinite(m?.end_point?.[2]) && plots.reach.width >= 300 ? ` · tip ${number(m.end_point[2], 1)} m` : ""}`);
+  heads.reach.who(subject);
   for (const name of ["bars", "limits"]) heads[name].who(subject);
   heads.trends.who(state.partner ? `${subject} ↔ ${label(state.partner)}` : subject);
   for (const name of ["scene", "plan", "bars", "limits", "trends", "timeline"]) heads[name].age(age);

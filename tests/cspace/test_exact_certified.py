@@ -87,7 +87,7 @@ def test_present_swing_is_taken_as_exact() -> None:
     assert not (image.certified_colliding()[tuple(index.T)] & ~touched).any()
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(
     st.tuples(*[st.floats(-2.0, 4.0)] * 3),
     st.tuples(*[st.floats(-3.0, 3.0)] * 3),

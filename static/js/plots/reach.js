@@ -83,7 +83,7 @@ function paint(g, width, height, dpr) {
   label(g, "tip distance, m ↑", box.left + 5, box.top + 3, { base: "top", halo: true });
   label(g, azimuthAxis ? "azimuth from east →" : "← swing left", azimuthAxis ? box.right - 5 : box.left + 5, box.bottom - 4, { align: azimuthAxis ? "right" : "left", base: "bottom", halo: true });
   if (!azimuthAxis) label(g, "right →", box.right - 5, box.bottom - 4, { align: "right", base: "bottom", halo: true });
-  if (width < 300) label(g, `tip ${number(own.end_point?.[2], 1)} m high`, box.right - 4, box.top + 3, { align: "right", base: "top", halo: true });
+  label(g, `tip ${number(own.end_point?.[2], 1)} m high`, box.right - 4, box.top + 3, { align: "right", base: "top", halo: true });
   legend(g, 6, height - 0.65 * t, width - 8, [
     [swatches.area(hatch(g, C.partner, dpr), C.partner), `${nameOf(state.partner)} (Sun)`],
     [swatches.area(C.free, C.free), "free"],
