@@ -4,4 +4,4 @@ from __future__ import annotations
 
 
 class InputError(Exception):
-    """Bad input: says the file, the field, the value and what is allowed. The program exits with 2."""
+    """Bad input: says file, field, value and what is allowed. The program exits with 2."""

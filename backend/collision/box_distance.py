@@ -32,6 +32,17 @@ def pair_distances(a: Boxes, b: Boxes, i: IntArray, j: IntArray) -> tuple[Array,
     return found, points
 
 
+def separations(a: Boxes, b: Boxes) -> Array:
+    """Largest gap of a[k] and b[k] along the 15 separating axes: (k,) [m].
+
+    A positive gap proves separation and bounds the distance from below; a negative one is minus
+    the penetration depth.
+    """
+    if len(a) != len(b):
+        raise ValueError(f"pairs need equally many boxes, not {len(a)} and {len(b)}")
+    return np.asarray(box_kernels.separations(*_arrays(a), *_arrays(b)))
+
+
 def lower_bounds(a: Boxes, b: Boxes) -> Array:
     """(n, m) lower bounds of the distances of all pairs, 0 where they may touch [m]."""
     return np.asarray(box_kernels.lower_bounds(*_arrays(a), *_arrays(b)))

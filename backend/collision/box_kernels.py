@@ -83,6 +83,15 @@ def separation(ca: Array, Ra: Array, ha: Array, cb: Array, Rb: Array, hb: Array)
 
 
 @njit(cache=True, nogil=True)
+def separations(ca: Array, Ra: Array, ha: Array, cb: Array, Rb: Array, hb: Array) -> Array:
+    """`separation` of the k-th boxes of both sets: (k,) [m]."""
+    gaps = np.empty(ca.shape[0])
+    for k in range(ca.shape[0]):
+        gaps[k] = separation(ca[k], Ra[k], ha[k], cb[k], Rb[k], hb[k])
+    return gaps
+
+
+@njit(cache=True, nogil=True)
 def _nearest_in_box(p: Array, c: Array, R: Array, h: Array, out: Array) -> float:
     """Writes the point of a box nearest to p; returns the squared distance [m^2]."""
     local = np.empty(3)

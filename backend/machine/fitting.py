@@ -12,14 +12,16 @@ from collections.abc import Callable
 import numpy as np
 from scipy.spatial import cKDTree
 
-from backend.machine.fitting_clip import outside_box, sample, subdivided, thin
+from backend.machine.fitting_clip import extremes, outside_box, sample, subdivided, thin
 from backend.machine.fitting_field import box_surface, distance_field
 from backend.machine.fitting_search import Piece, search
 from backend.spatial.boxes import Boxes
 from backend.spatial.types import Array
 
 PAD = 7e-4  # [m] on every side: rounding, and the arc between two samples of a cylinder's sweep
-_SLACK = 0.03  # [m] the search aims this much below max_excess: grid, sampling, final growth
+# The search aims so much [m] below max_excess, for the grid's error and the growth over what the
+# points left out; the next value where the first was reached and proved too little.
+_SLACK = (0.03, 0.045, 0.06)
 
 
 def fit_boxes(
@@ -42,7 +44,6 @@ def fit_boxes(
     report = progress or (lambda share: None)
     points = _points(triangles)
     field = distance_field(triangles)
-    tolerance = max(max_excess - _SLACK, 0.5 * max_excess)
     mesh = _mesh_points(triangles)
 
     def boxes_of(pieces: list[Piece]) -> Boxes:
@@ -52,13 +53,19 @@ def fit_boxes(
         centers = (R @ ((low + high) / 2.0)[:, :, None])[:, :, 0]
         return Boxes(centers, R, (high - low) / 2.0 + PAD)
 
-    def good_enough(pieces: list[Piece]) -> bool:
-        # The grid errs by up to two centimetres: only near the goal is a closer look worth it.
-        return _farthest(boxes_of(pieces), mesh, 0.03) <= max_excess
-
-    found = search(points, field, max_boxes, tolerance, report, good_enough)
+    best, least = None, np.inf
+    for slack in _SLACK:
+        tolerance = max(max_excess - slack, 0.5 * max_excess)
+        sets, reached = search(points, field, max_boxes, tolerance, report)
+        for boxes in map(boxes_of, sets):
+            value = _farthest(boxes, mesh, 0.03)
+            if value < least:
+                best, least = boxes, value
+        if least <= max_excess or not reached:
+            break
     report(1.0)
-    return min(map(boxes_of, found), key=lambda boxes: _farthest(boxes, mesh, 0.03))
+    assert best is not None
+    return best
 
 
 def excess(boxes: Boxes, triangles: Array, spacing: float = 0.03) -> float:
@@ -95,12 +102,12 @@ def _farthest(boxes: Boxes, mesh: cKDTree, spacing: float) -> float:
 
 
 def _points(triangles: Array) -> Array:
-    """Points of the mesh for the search: as dense as 15,000 of them allow, 3 to 6 cm."""
-    spacing = 0.03
-    dense = points = thin(sample(triangles, spacing), spacing / 2.0)
-    while len(points) > 15_000 and spacing < 0.06:
-        spacing *= 1.15
-        points = thin(dense, spacing)
+    """Points of the mesh for the search: the outermost of small cubes, at most some 25,000."""
+    dense, cell = sample(triangles, 0.03), 0.06
+    points = extremes(dense, cell)
+    while len(points) > 25_000 and cell < 0.2:
+        cell *= 1.25
+        points = extremes(points, cell)
     return np.ascontiguousarray(points)
 
 

@@ -258,17 +258,15 @@ def search(
     max_boxes: int,
     tolerance: float,
     progress: Callable[[float], None],
-    good_enough: Callable[[list[Piece]], bool],
     rounds: int = 120,
     patience: int = 80,
-) -> list[list[Piece]]:
+) -> tuple[list[list[Piece]], bool]:
     """Sets of at most `max_boxes` pieces that cover all points, for a closer look at each.
 
 
-    The cost leads the search; returned are the cheapest set and those of the least excess met on
-    the way.
-    `good_enough` ends it at once; else it ends after `rounds` trials, or after `patience` of them
-    in a row without a better set.
+    The cost leads the search; returned are the cheapest set, those of the least excess met on the
+    way, and whether one of them kept within the tolerance, which ends the search at once. Else it
+    ends after `rounds` trials, or after `patience` of them in a row without a better set.
     """
     s = Search(points, distance, tolerance)
     starts = [s.start(max_boxes, 2 * max_boxes, alone) for alone in (False, True)]
@@ -280,7 +278,7 @@ def search(
     met = [(s.worst(p), -1, p) for p in (pieces, *starts)]
     for r in range(rounds):
         progress(0.2 + 0.8 * r / rounds)
-        if r - last_gain > patience:
+        if met[-1][0] == 0.0 or r - last_gain > patience:
             break
         trial = s.improved(pieces, rng, (1, 1, 2, 1, 1, 3)[r % 6])
         value = s.cost(trial)
@@ -288,15 +286,13 @@ def search(
             trial = s.turned(s.shrunk(trial)) if r % 4 == 3 else s.shrunk(trial)
             value = s.cost(trial)
         if value < 1.3 * least + 1e-12:
-            worst = s.worst(trial)
-            nearest = min(m[0] for m in met)
-            met.append((worst, r, trial))
-            if worst < tolerance + 0.05 and worst < nearest + 1e-3 and good_enough(trial):
-                return [trial]
+            met.append((s.worst(trial), r, trial))
         if value < least - 1e-12:
             pieces, least, last_gain = trial, value, r
     met.sort(key=lambda item: item[:2])
-    return [s.turned(pieces), pieces, *(p for _, _, p in met[:KEPT])]
+    reached = met[0][0] == 0.0
+    sets = [p for _, _, p in met[:KEPT]]
+    return (sets if reached else [s.turned(pieces), pieces, *sets]), reached
 
 
 def _stacked(pieces: list[Piece]) -> tuple[Array, Array, Array]:

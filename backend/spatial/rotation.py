@@ -43,7 +43,7 @@ def from_attitude(
 
 
 def to_attitude(R: Array) -> tuple[Array, Array, Array]:
-    """(yaw, pitch, roll) [rad] of R (..., 3, 3); the inverse of `from_attitude` for |pitch|<pi/2."""
+    """(yaw, pitch, roll) [rad] of R (..., 3, 3); undoes `from_attitude` for |pitch| < pi/2."""
     yaw = np.arctan2(R[..., 1, 0], R[..., 0, 0])
     pitch = np.arcsin(np.clip(R[..., 2, 0], -1.0, 1.0))
     roll = np.arctan2(R[..., 2, 1], R[..., 2, 2])
@@ -70,7 +70,9 @@ def to_quaternion(R: Array) -> Array:
         ],
         axis=-1,
     )
-    yz, zx, xy = (m[..., 2, 1], m[..., 1, 2]), (m[..., 0, 2], m[..., 2, 0]), (m[..., 1, 0], m[..., 0, 1])
+    yz = m[..., 2, 1], m[..., 1, 2]
+    zx = m[..., 0, 2], m[..., 2, 0]
+    xy = m[..., 1, 0], m[..., 0, 1]
     rows = [
         [t[..., 0], yz[0] - yz[1], zx[0] - zx[1], xy[0] - xy[1]],
         [yz[0] - yz[1], t[..., 1], xy[0] + xy[1], zx[0] + zx[1]],
@@ -85,7 +87,7 @@ def to_quaternion(R: Array) -> Array:
 
 
 def from_quaternion(wxyz: Array) -> Array:
-    """Rotation matrices (..., 3, 3) of quaternions (..., 4) in (w, x, y, z) order, any length > 0."""
+    """Rotation matrices (..., 3, 3) of quaternions (..., 4), (w, x, y, z), of any length > 0."""
     q = np.asarray(wxyz, dtype=float)
     w, x, y, z = np.moveaxis(q / np.linalg.norm(q, axis=-1, keepdims=True), -1, 0)
     rows = [

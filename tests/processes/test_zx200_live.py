@@ -7,7 +7,9 @@ from pathlib import Path
 import pytest
 from live import all_valid, backend
 
-pytestmark = [pytest.mark.processes, pytest.mark.timeout(600)]
+from backend.machine.load import load_machine
+
+pytestmark = [pytest.mark.processes, pytest.mark.timeout(1200)]
 
 SITE = """
 name = "two-zx200"
@@ -30,6 +32,7 @@ joints_deg = {{ swing = 0.0, boom = -35.0, stick = 90.0, bucket = 50.0 }}
 def test_the_demo_runs_on_it(shared_data: Path, tmp_path: Path) -> None:
     model = shared_data / "zx200" / "zx200.xacro"
     site = tmp_path / "site.toml"
+    load_machine(str(model))  # its bodies are fitted to its meshes once and kept
     site.write_text(
         SITE
         + MACHINE.format(name="west", model=model, east=308600.0, yaw=0.0)
