@@ -1,0 +1,97 @@
+"""A real machine, unchanged: its bodies contain its meshes and exceed them by what is stated."""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from backend.machine.fitting import excess
+from backend.machine.load import SHIPPED, load_machine
+from backend.machine.model import Machine
+from backend.machine.sidecar import read_sidecar
+from backend.machine.sweeps import swept_by_cylinders
+from backend.spatial.boxes import Boxes
+from backend.spatial.types import Array
+
+STATED = {"bucket": 0.15, "stick": 0.15, "boom": 0.30, "tracks": 0.30, "upper": 0.45}
+"""Largest excess over the meshes [m] that the README states; 0.15 m is what is wanted of all."""
+
+
+@pytest.fixture(scope="module")
+def xacro(shared_data: Path) -> Path:
+    return shared_data / "zx200" / "zx200.xacro"
+
+
+@pytest.fixture(scope="module")
+def zx200(xacro: Path) -> Machine:
+    return load_machine(str(xacro))
+
+
+@pytest.fixture(scope="module")
+def swept(zx200: Machine, xacro: Path) -> dict[int, Array]:
+    """Link index -> triangles of the cylinders over their whole strokes, in the link's frame."""
+    sidecar = SHIPPED / "zx200.toml"
+    return swept_by_cylinders(
+        zx200.links, zx200.joints, read_sidecar(sidecar), xacro, str(sidecar), None
+    )
+
+
+def covered(boxes: Boxes, points: Array) -> Array:
+    """(n,) whether each point (n, 3) is in at least one box."""
+    inside = np.zeros(len(points), dtype=bool)
+    for k in range(len(boxes)):
+        local = (points - boxes.centers[k]) @ boxes.rotations[k]
+        inside |= (np.abs(local) <= boxes.half_extents[k] + 1e-9).all(axis=1)
+    return inside
+
+
+def bodies_of(machine: Machine, link: int) -> Boxes:
+    return machine.bodies.take(np.flatnonzero(np.array(machine.body_links) == link))
+
+
+def parts(machine: Machine) -> dict[str, int]:
+    """Part -> its link; the marker of the bucket's end, a millimetre wide, is no part."""
+    return {
+        link.part: i
+        for i, link in enumerate(machine.links)
+        if sum(len(v.vertices) for v in link.visuals) > 100
+    }
+
+
+@pytest.mark.timeout(900)
+@pytest.mark.parametrize("part", STATED)
+def test_every_vertex_is_in_a_body_of_its_link(zx200: Machine, part: str) -> None:
+    link = parts(zx200)[part]
+    vertices = np.concatenate([v.vertices for v in zx200.links[link].visuals])
+    assert len(vertices) > 1000
+    inside = covered(bodies_of(zx200, link), vertices)
+    assert inside.all(), f"{np.count_nonzero(~inside)} of {len(inside)} vertices outside"
+
+
+def test_cylinders_are_enclosed_over_their_whole_strokes(
+    zx200: Machine, swept: dict[int, Array]
+) -> None:
+    assert len(swept) >= 2
+    for link, triangles in swept.items():
+        assert covered(bodies_of(zx200, link), triangles.reshape(-1, 3)).all()
+
+
+def test_there_are_at_most_twelve_bodies_a_link(zx200: Machine) -> None:
+    counts = Counter(zx200.body_links)
+    assert max(counts.values()) <= 12
+    assert {zx200.links[link].part for link in counts} == set(STATED)
+
+
+@pytest.mark.parametrize("part", STATED)
+def test_bodies_exceed_the_meshes_by_no_more_than_stated(
+    zx200: Machine, swept: dict[int, Array], part: str
+) -> None:
+    link = parts(zx200)[part]
+    meshes = [v.vertices[v.faces] for v in zx200.links[link].visuals]
+    triangles = np.concatenate([*meshes, *([swept[link]] if link in swept else [])])
+    measured = excess(bodies_of(zx200, link), triangles)
+    print(f"\n{part}: expected <= {STATED[part]:.2f} m, measured {measured:.3f} m")
+    assert measured <= STATED[part]
