@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import gc
 import math
 import sys
 import time
@@ -149,6 +150,10 @@ class Station:
         self._closing.callback(relay.stop)
         self.web.start()
         self._closing.callback(self.web.stop)
+        # What is loaded by now stays: without this, the collector would walk through all of it
+        # again and again, and each walk holds up the fast loop.
+        gc.collect()
+        gc.freeze()
 
     def close(self) -> None:
         """Close everything, in the reverse order of opening."""

@@ -25,7 +25,7 @@ from backend.shell.hub import Hub
 
 log = logging.getLogger(__name__)
 
-IMAGE_WORKERS = 2
+IMAGE_WORKERS = 1  # they hold the interpreter: a second one would only slow the fast loop
 HISTORY = 500
 
 

@@ -21,7 +21,7 @@ from backend.shell.hub import Hub
 
 log = logging.getLogger(__name__)
 
-SNAPSHOT_PERIOD = 0.03  # at least, between two snapshots to one page [s]
+SNAPSHOT_PERIOD = 0.018  # at least, between two snapshots to one page [s]
 MAX_MESSAGE = 4096  # from a page [bytes]
 IN_FLIGHT = 2  # snapshots sent to a page and not acknowledged by it
 
