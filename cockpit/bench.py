@@ -26,6 +26,7 @@ from backend.site.site import Site, load_site
 from backend.spatial import rotation, transform
 from cockpit.bench_input import cycles
 from cockpit.bench_live import live_rows
+from cockpit.bench_rows import percentile_rows
 from cockpit.station import load_models, make_config
 
 CYCLES = 500
@@ -53,24 +54,6 @@ def run_bench(as_json: bool, seconds: float) -> None:
         print(document.model_dump_json(indent=2))
     else:
         _print(document)
-
-
-def percentile_rows(
-    name: str, seconds: list[float], target_ms: float | None = None
-) -> list[BenchRow]:
-    """Rows for p50, p95 and p99 of durations; the target applies to p95."""
-    ms = 1e3 * np.asarray(seconds)
-    low, high = (float(v) for v in np.percentile(ms, [5, 95]))
-    return [
-        BenchRow(
-            name=f"{name} p{p}",
-            value=float(np.percentile(ms, p)),
-            unit="ms",
-            spread=(low, high),
-            target=target_ms if p == 95 else None,
-        )
-        for p in (50, 95, 99)
-    ]
 
 
 def pipeline_rows(site: Site, config: Config) -> list[BenchRow]:

@@ -18,6 +18,7 @@ from websockets.sync.client import connect
 from backend.documents.bench import BenchRow
 from backend.shell.app.wire import decode
 from backend.shell.link.session import open_session, with_port
+from cockpit.bench_rows import percentile_rows
 
 SITE = "demo"
 MACHINES = ("left", "right")
@@ -25,8 +26,6 @@ MACHINES = ("left", "right")
 
 def live_rows(seconds: float) -> list[BenchRow]:
     """Cycle times of a running backend, its memory, and from a pose's arrival to the websocket."""
-    from cockpit.bench import percentile_rows
-
     endpoint = with_port("tcp/127.0.0.1:0")
     with _backend(endpoint) as (process, url):
         session = open_session(connect=[endpoint], mode="router")

@@ -39,6 +39,8 @@ from backend.site.site import Site
 from cockpit.views.inputs import scene_site
 from cockpit.views.server import HEAD, View, start
 
+LOOPBACK = ("127.0.0.1", "localhost", "::1")
+
 
 @dataclass(frozen=True)
 class Options:
@@ -142,7 +144,12 @@ class Station:
             on_message=self._on_message,
         )
         hooks = Hooks(opened=self.view.attach, closed=self.view.detach)
-        app = create_app(sources, viewer_router(lambda: self.view.port, hooks, HEAD))
+        loopback = options.host in LOOPBACK
+        app = create_app(
+            sources,
+            viewer_router(lambda: self.view.port, hooks, HEAD),
+            hosts=LOOPBACK if loopback else ("*",),
+        )
         self.web = WebServer(app, listener)
         self.runner.start()
         self._closing.callback(self.runner.stop)

@@ -16,6 +16,7 @@ from backend.documents.state import (
     joint_vector,
     velocity_vector,
 )
+from backend.documents.sun import sun_state_document
 from backend.errors import InputError
 from backend.fusion.crs import SiteFrame
 from backend.fusion.pose import FusedPose, Validity
@@ -193,7 +194,6 @@ def _sun(
     """Sun's sets with partner as the obstacle A and own as B."""
     b, a = sun_pose(machines[own], poses[own]), sun_pose(machines[partner], poses[partner])
     image = sun_image(a, b, machines[own].max_reach, parameters.eta, parameters.m, parameters.n)
-    now = image.current
     return {
         "eta": image.eta,
         "m": image.m,
@@ -205,14 +205,5 @@ def _sun(
         "boom": image.joints.boom.tolist(),
         "stick": image.joints.stick.tolist(),
         "bucket": image.joints.bucket.tolist(),
-        "current": {
-            "theta": now.theta,
-            "d": now.d,
-            "boom": now.boom,
-            "stick": now.stick,
-            "bucket": now.bucket,
-            "collides": now.collides,
-            "in_zone": now.in_zone,
-            "zone_distance": now.zone_distance,
-        },
+        "current": sun_state_document(image.current),
     }

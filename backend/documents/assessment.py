@@ -49,6 +49,7 @@ class SunCurrent(BaseModel):
     collides: bool = Field(description="in the obstacle image of S^2")
     in_zone: bool = Field(description="swing centre inside the warning zone")
     zone_distance: float = Field(description="to the warning zone's edge, positive outside [m]")
+    in_joint_set: bool = Field(description="near a sample of CO_theta^3; a projection, no contact")
 
 
 class SunDocument(BaseModel):

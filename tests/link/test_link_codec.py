@@ -228,3 +228,13 @@ def test_twenty_thousand_broken_messages():
             assert peak < 5e6
             assert current < 2e6
     assert 10_000 < refused < 20_000
+
+
+def test_a_heading_that_says_it_has_no_orientation_is_refused() -> None:
+    message = TYPESTORE.deserialize_cdr(
+        encode.encode_heading(STAMP, 2.5, 1e-4), "sensor_msgs/msg/Imu"
+    )
+    message.orientation_covariance = np.array([-1.0] + [0.0] * 8)
+    payload = bytes(TYPESTORE.serialize_cdr(message, "sensor_msgs/msg/Imu"))
+    with pytest.raises(DecodeError, match="no orientation"):
+        decode("left", "gnss/heading", payload, 0.0)

@@ -6,6 +6,8 @@ import json
 import signal
 import socket
 import time
+import urllib.error
+import urllib.request
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -239,3 +241,12 @@ def test_ctrl_c_ends_everything_quickly() -> None:
         assert time.monotonic() - begun < 10
         assert station.process.returncode == 0
         end(station.process)
+
+
+def test_a_foreign_name_for_the_loopback_leads_nowhere(
+    running: tuple[Backend, dict[str, Any]],
+) -> None:
+    station, _ = running
+    request = urllib.request.Request(station.url + "/api/health", headers={"Host": "evil.example"})
+    with pytest.raises(urllib.error.HTTPError, match="400"):
+        urllib.request.urlopen(request, timeout=10)

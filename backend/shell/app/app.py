@@ -14,6 +14,7 @@ from fastapi.responses import FileResponse, JSONResponse
 from fastapi.staticfiles import StaticFiles
 from fastapi_offline import FastAPIOffline
 from starlette.middleware.base import RequestResponseEndpoint
+from starlette.middleware.trustedhost import TrustedHostMiddleware
 
 from backend.fusion.pose import Validity
 from backend.pipeline.records import Snapshot
@@ -48,8 +49,14 @@ class Sources:
     on_message: Callable[[dict[str, Any]], None]
 
 
-def create_app(sources: Sources, viewer: APIRouter | None = None) -> FastAPI:
-    """The application. viewer: routes of the 3D view, served below /view."""
+def create_app(
+    sources: Sources, viewer: APIRouter | None = None, hosts: tuple[str, ...] = ("*",)
+) -> FastAPI:
+    """The application. viewer: routes of the 3D view, served below /view.
+
+    hosts: names under which it answers. A page that binds to the loopback answers to no other
+    name, so that a foreign name that resolves to the loopback leads nowhere.
+    """
     app: FastAPI = FastAPIOffline(  # its documentation page needs no network
         title="Excavator cockpit",
         description="Fused poses, distances, warning zones and C-space images of a site's "
@@ -59,6 +66,7 @@ def create_app(sources: Sources, viewer: APIRouter | None = None) -> FastAPI:
         openapi_url="/api/openapi.json",
         redoc_url=None,
     )
+    app.add_middleware(TrustedHostMiddleware, allowed_hosts=list(hosts))
     feed = Feed(sources.frames, sources.site, sources.on_message)
     hub = sources.frames.hub
 

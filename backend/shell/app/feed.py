@@ -14,6 +14,7 @@ from typing import Any
 
 from fastapi import WebSocket, WebSocketDisconnect
 
+from backend.documents.sun import sun_state_document
 from backend.pipeline.images import PairImage, frame_arrays
 from backend.pipeline.records import Snapshot
 from backend.shell.app.wire import encode
@@ -53,7 +54,7 @@ class Frames:
 
 
 def _image_frame(image: PairImage) -> bytes:
-    sun, now = image.sun, image.sun.current
+    sun = image.sun
     header = {
         "type": "sun",
         "key": image.key,
@@ -64,17 +65,7 @@ def _image_frame(image: PairImage) -> bytes:
         "m": sun.m,
         "n": sun.n,
         "max_reach": sun.b_max_reach,
-        "current": {
-            "theta": now.theta,
-            "d": now.d,
-            "boom": now.boom,
-            "stick": now.stick,
-            "bucket": now.bucket,
-            "collides": now.collides,
-            "in_zone": now.in_zone,
-            "zone_distance": now.zone_distance,
-            "in_joint_set": now.in_joint_set,
-        },
+        "current": sun_state_document(sun.current),
     }
     return encode(header, frame_arrays(image))
 

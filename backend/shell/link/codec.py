@@ -168,6 +168,8 @@ def _variance(covariance: Any, *indices: int) -> float:
 
 
 def _heading(msg: Any, machine: str, arrival: float, _: dict[str, str]) -> HeadingSample:
+    if float(msg.orientation_covariance[0]) == -1.0:
+        raise DecodeError("gnss/heading: covariance -1 says that there is no orientation")
     yaw = to_attitude(from_quaternion(_orientation(msg)))[0]
     variance = _variance(msg.orientation_covariance, 8)
     return HeadingSample(machine, _stamp(msg), arrival, float(yaw), variance)
