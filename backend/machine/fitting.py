@@ -32,8 +32,9 @@ def fit_boxes(
 ) -> Boxes:
     """Oriented boxes that together contain all triangles (n, 3, 3) [m], in the triangles' frame.
 
-    At most `max_boxes`, so placed that `excess` is at most `max_excess` [m] where the search can
-    reach it, else the best found. progress: called with the share done, 0..1. Deterministic.
+    One box where that is enough; else at most `max_boxes`, so placed that `excess` is at most
+    `max_excess` [m] where the search can reach it, else the best found. progress: called with the
+    share done, 0..1. Deterministic.
     Raises ValueError for an empty or non-finite set.
     """
     triangles = np.asarray(triangles, dtype=float)
@@ -42,9 +43,12 @@ def fit_boxes(
     if not np.isfinite(triangles).all():
         raise ValueError("triangles must be finite")
     report = progress or (lambda share: None)
+    mesh = _mesh_points(triangles)
+    one = _around(triangles)
+    if _farthest(one, mesh, 0.03) <= max_excess:
+        return one
     points = _points(triangles)
     field = distance_field(triangles)
-    mesh = _mesh_points(triangles)
 
     def boxes_of(pieces: list[Piece]) -> Boxes:
         R = np.array([p.R for p in pieces])
@@ -90,6 +94,13 @@ def surface_points(boxes: Boxes, spacing: float) -> Array:
                 points = points[~(np.abs(local) < boxes.half_extents[other]).all(axis=1)]
         kept.append(points)
     return np.concatenate(kept)
+
+
+def _around(triangles: Array) -> Boxes:
+    """One box along the axes of the triangles' frame."""
+    corners = triangles.reshape(-1, 3)
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    return Boxes(((low + high) / 2.0)[None], np.eye(3)[None], ((high - low) / 2.0 + PAD)[None])
 
 
 def _mesh_points(triangles: Array) -> cKDTree:
