@@ -18,6 +18,7 @@ from rich.progress import Progress
 from backend.cspace.resolution import resolution
 from backend.documents.site import site_document
 from backend.documents.snapshot import snapshot_document
+from backend.errors import InputError
 from backend.machine.load import load_machine
 from backend.machine.model import Machine
 from backend.pipeline.config import Config
@@ -68,7 +69,10 @@ def load_models(site: Site) -> dict[str, Machine]:
                     bar.update(task, completed=share, description=text)
 
                 sidecar = None if machine.sidecar is None else site.folder / machine.sidecar
-                loaded[key] = load_machine(machine.model, sidecar, site.folder, progress)
+                try:
+                    loaded[key] = load_machine(machine.model, sidecar, site.folder, progress)
+                except InputError as error:
+                    raise InputError(f"{site.path}: machine {machine.name}: {error}") from error
                 bar.update(task, completed=1.0)
             models[machine.name] = loaded[key]
     return models

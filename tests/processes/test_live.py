@@ -9,6 +9,7 @@ import time
 import urllib.error
 import urllib.request
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import jsonschema
@@ -250,3 +251,14 @@ def test_a_foreign_name_for_the_loopback_leads_nowhere(
     request = urllib.request.Request(station.url + "/api/health", headers={"Host": "evil.example"})
     with pytest.raises(urllib.error.HTTPError, match="400"):
         urllib.request.urlopen(request, timeout=10)
+
+
+def test_a_site_with_an_unknown_model_names_file_and_machine(
+    repository: Path, tmp_path: Path
+) -> None:
+    text = (repository / "scenes" / "sites" / "demo.toml").read_text()
+    site = tmp_path / "bad.toml"
+    site.write_text(text.replace('model = "mini"', 'model = "nosuch"', 1))
+    done = cockpit("demo", "--site", str(site), "--port", "0", "--no-browser")
+    assert done.returncode == 2
+    assert all(word in done.stderr for word in ("bad.toml", "left", "nosuch", "mini"))
