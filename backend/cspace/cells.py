@@ -1,0 +1,75 @@
+"""Cells as views draw them: one byte each, a bit for every layer and for both certificates."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from backend.cspace.exact import (
+    INNER,
+    OUTER,
+    ArmModel,
+    JointGrid,
+    arm_model,
+    blocked,
+    self_blocked,
+    unpacked,
+)
+from backend.machine.model import Machine
+from backend.spatial.boxes import Boxes
+from backend.spatial.types import AnyArray, Array
+
+PARTNER, SITE, SELF = 1, 2, 4
+"""Bits of a cell: its centre touches that layer, bodies as built."""
+
+FREE, COLLIDING = 64, 128
+"""Bits of a cell: certified for every configuration in it. With neither, the cell is undecided."""
+
+LAYER_BITS = {"partner": PARTNER, "site": SITE, "self": SELF}
+
+
+@dataclass(frozen=True)
+class CellModels:
+    """A machine prepared once for many images. built: bodies as they are; grown: by `eta` [m]."""
+
+    machine: Machine
+    eta: float
+    built: ArmModel
+    grown: ArmModel
+
+
+def cell_models(machine: Machine, q: Array, eta: float) -> CellModels:
+    """q: (n,) [rad], of which tilt and rotate are held; eta: the growth for "free" [m]."""
+    return CellModels(machine, eta, arm_model(machine, q), arm_model(machine, q, eta))
+
+
+def coded(models: CellModels, grid: JointGrid, layers: Mapping[str, Boxes]) -> AnyArray:
+    """uint8 (swing, boom, stick, bucket) of a grid. layers: "partner", "site" in the root frame."""
+    cells = np.zeros(grid.shape, dtype=np.uint8)
+    for name, boxes in layers.items():
+        if len(boxes):
+            _mark(cells, blocked(models.built, grid, boxes), LAYER_BITS[name])
+    _mark(cells, self_blocked(models.built, grid), SELF)
+    everything = _together(layers)
+    inner = blocked(models.built, grid, everything, INNER) | self_blocked(models.built, grid, INNER)
+    outer = blocked(models.grown, grid, everything, OUTER) | self_blocked(models.grown, grid, OUTER)
+    _mark(cells, inner, COLLIDING)
+    _mark(cells, ~outer, FREE)
+    return cells
+
+
+def _together(layers: Mapping[str, Boxes]) -> Boxes:
+    parts = [boxes for boxes in layers.values() if len(boxes)]
+    if not parts:
+        return Boxes(np.zeros((0, 3)), np.zeros((0, 3, 3)), np.zeros((0, 3)))
+    return Boxes(
+        np.concatenate([p.centers for p in parts]),
+        np.concatenate([p.rotations for p in parts]),
+        np.concatenate([p.half_extents for p in parts]),
+    )
+
+
+def _mark(cells: AnyArray, bits: AnyArray, flag: int) -> None:
+    cells |= unpacked(bits, cells.shape[3]).view(np.uint8) * np.uint8(flag)
