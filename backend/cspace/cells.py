@@ -18,7 +18,7 @@ from backend.cspace.exact import (
     unpacked,
 )
 from backend.machine.model import Machine
-from backend.spatial.boxes import Boxes
+from backend.spatial.boxes import Boxes, concatenated
 from backend.spatial.types import AnyArray, Array
 
 PARTNER, SITE, SELF = 1, 2, 4
@@ -32,17 +32,22 @@ LAYER_BITS = {"partner": PARTNER, "site": SITE, "self": SELF}
 
 @dataclass(frozen=True)
 class CellModels:
-    """A machine prepared once for many images. built: bodies as they are; grown: by `eta` [m]."""
+    """A machine prepared once for many images. built: bodies as they are; grown: by `eta` [m], for
+    what the obstacles' and the own places may be wrong by; slack: (4,) what the own joints may be
+    wrong by, which is all that matters between the machine's own bodies [rad].
+    """
 
     machine: Machine
     eta: float
+    slack: Array
     built: ArmModel
     grown: ArmModel
 
 
-def cell_models(machine: Machine, q: Array, eta: float) -> CellModels:
-    """q: (n,) [rad], of which tilt and rotate are held; eta: the growth for "free" [m]."""
-    return CellModels(machine, eta, arm_model(machine, q), arm_model(machine, q, eta))
+def cell_models(machine: Machine, q: Array, eta: float, slack: Array) -> CellModels:
+    """q: (n,) [rad], of which tilt and rotate are held; eta, slack: see CellModels."""
+    built, grown = arm_model(machine, q), arm_model(machine, q, eta)
+    return CellModels(machine, eta, np.asarray(slack, dtype=float)[:4], built, grown)
 
 
 def coded(models: CellModels, grid: JointGrid, layers: Mapping[str, Boxes]) -> AnyArray:
@@ -52,23 +57,13 @@ def coded(models: CellModels, grid: JointGrid, layers: Mapping[str, Boxes]) -> A
         if len(boxes):
             _mark(cells, blocked(models.built, grid, boxes), LAYER_BITS[name])
     _mark(cells, self_blocked(models.built, grid), SELF)
-    everything = _together(layers)
+    everything = concatenated(layers.values())
     inner = blocked(models.built, grid, everything, INNER) | self_blocked(models.built, grid, INNER)
-    outer = blocked(models.grown, grid, everything, OUTER) | self_blocked(models.grown, grid, OUTER)
+    outer = blocked(models.grown, grid, everything, OUTER)
+    outer |= self_blocked(models.built, grid, OUTER, models.slack)
     _mark(cells, inner, COLLIDING)
     _mark(cells, ~outer, FREE)
     return cells
-
-
-def _together(layers: Mapping[str, Boxes]) -> Boxes:
-    parts = [boxes for boxes in layers.values() if len(boxes)]
-    if not parts:
-        return Boxes(np.zeros((0, 3)), np.zeros((0, 3, 3)), np.zeros((0, 3)))
-    return Boxes(
-        np.concatenate([p.centers for p in parts]),
-        np.concatenate([p.rotations for p in parts]),
-        np.concatenate([p.half_extents for p in parts]),
-    )
 
 
 def _mark(cells: AnyArray, bits: AnyArray, flag: int) -> None:

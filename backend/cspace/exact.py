@@ -164,26 +164,31 @@ def blocked(model: ArmModel, grid: JointGrid, obstacles: Boxes, kind: int = EXAC
     return _image(model, grid, obstacles, pairs[model.arm.bodies], base, kind)
 
 
-def self_blocked(model: ArmModel, grid: JointGrid, kind: int = EXACT) -> AnyArray:
+def self_blocked(
+    model: ArmModel, grid: JointGrid, kind: int = EXACT, slack: Array | None = None
+) -> AnyArray:
     """Which cells touch the machine itself: uint64 (swing, boom, stick, words); as `blocked`.
 
-    The body farther out is grown by the model's inflation, the other is as built.
+    The body farther out is grown by the model's inflation, the other is as built. slack: (4,) how
+    far each joint may be from its value, which widens the cells of OUTER [rad].
     """
-    out = _self_part(model, grid, model.tracks, kind)
-    out |= _self_part(model, _hold(grid, 0, 0.0), model.upper, kind)
+    out = _self_part(model, grid, model.tracks, kind, slack)
+    out |= _self_part(model, _hold(grid, 0, 0.0), model.upper, kind, slack)
     bodies, groups = model.arm.bodies, model.arm.groups
     held = _hold(_hold(grid, 0, 0.0), 1, 0.0)
-    out |= _self_part(model, held, bodies[groups == 0], kind)
+    out |= _self_part(model, held, bodies[groups == 0], kind, slack)
     held = _hold(held, 2, 0.0)
-    out |= _self_part(model, held, bodies[groups == 1], kind)
+    out |= _self_part(model, held, bodies[groups == 1], kind, slack)
     held = _hold(held, 3, 0.0)
-    inside = _self_part(model, held, bodies[groups == 2], kind)
+    inside = _self_part(model, held, bodies[groups == 2], kind, slack)
     if inside.any():
         out[:] = _full_words(grid)
     return out
 
 
-def _self_part(model: ArmModel, grid: JointGrid, others: IntArray, kind: int) -> AnyArray:
+def _self_part(
+    model: ArmModel, grid: JointGrid, others: IntArray, kind: int, slack: Array | None
+) -> AnyArray:
     """Bodies `others`, where they stand at joint values 0, as obstacles to what is farther out."""
     bodies = model.arm.bodies
     pairs = model.self_pairs[np.ix_(bodies, others)]
@@ -192,7 +197,7 @@ def _self_part(model: ArmModel, grid: JointGrid, others: IntArray, kind: int) ->
     used = pairs.any(axis=0)
     obstacles = model.as_built.take(others[used])
     none = np.zeros(grid.shape[0], dtype=bool)
-    return _image(model, grid, obstacles, pairs[:, used], none, kind)
+    return _image(model, grid, obstacles, pairs[:, used], none, kind, slack)
 
 
 def _hold(grid: JointGrid, joint: int, value: float) -> JointGrid:
@@ -210,6 +215,7 @@ def _image(
     pairs: BoolArray,
     base: BoolArray,
     kind: int,
+    slack: Array | None = None,
 ) -> AnyArray:
     out = np.zeros((*grid.shape[:3], grid.words), dtype=np.uint64)
     if not base.any() and not pairs.any():
@@ -221,6 +227,8 @@ def _image(
         for k, n in enumerate(grid.shape[1:])
     ]
     halves = np.zeros(4) if kind == EXACT else grid.steps / 2.0
+    if kind == OUTER and slack is not None:
+        halves = halves + slack
     body: Profiles = model.arm.inner if kind == INNER else model.arm.outer
     arguments = (
         model.chain,

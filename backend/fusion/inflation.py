@@ -42,3 +42,9 @@ def eta(machine: Machine, pose: FusedPose, configured: float) -> float:
     travelled = float(np.linalg.norm(pose.base_velocity)) * base_age
     swept = float(arms @ np.abs(pose.joint_velocities)) * arm_age
     return configured + 3.0 * math.sqrt(variance) + travelled + swept
+
+
+def joint_slack(pose: FusedPose) -> Array:
+    """(n,) how far each joint may be from its value: 3 sigma + |rate| * age [rad]."""
+    age = min(pose.streams["joints"].age, OLDEST)
+    return np.asarray(3.0 * pose.sigma_joints + np.abs(pose.joint_velocities) * age)

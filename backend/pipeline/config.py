@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from backend.fusion.crs import SiteFrame
 from backend.machine.model import Machine
+from backend.pipeline.surroundings import NO_SITE_BODIES, SiteBodies
 from backend.safety.partner import Limits
 
 
@@ -25,3 +26,5 @@ class Config:
     eta: float
     mode: str
     far: float = 15.0
+    site: SiteBodies = NO_SITE_BODIES
+    stop_latency: float = 0.3

@@ -1,37 +1,40 @@
 """The exact images of one machine among its partners and the site, for one snapshot.
 
 Three slices through the present configuration, one bar per joint, the volume over boom, stick and
-bucket at the present swing, and the reach image. Every cell says what it hits and is certified free,
-certified colliding or undecided.
+bucket at the present swing, and the reach image. Every cell says what it hits and is certified
+free, certified colliding or undecided.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
-from backend.cspace.cells import CellModels, cell_models, coded
-from backend.cspace.exact import JointGrid, joint_grid
+from backend.cspace.cells import COLLIDING, FREE, CellModels, cell_models, coded
+from backend.cspace.exact import JointGrid
 from backend.cspace.reach_image import ReachImage, reach_image
+from backend.cspace.regions import cell_of
+from backend.fusion.inflation import joint_slack
 from backend.fusion.pose import Validity
 from backend.machine.model import Machine
+from backend.machine.stopping import full_stopping_distances, stopping_distances
 from backend.pipeline.config import Config
-from backend.pipeline.place import base_transform
 from backend.pipeline.records import Snapshot
-from backend.spatial import transform
+from backend.pipeline.surroundings import Surroundings, surroundings
 from backend.spatial.boxes import Boxes
 from backend.spatial.types import AnyArray, Array
 
 ARM = ("swing", "boom", "stick", "bucket")
 PLANES = ((1, 2), (1, 3), (2, 3))  # boom-stick, boom-bucket, stick-bucket
-PATCH_CELLS, PATCH_FINER = 6, 4
+
+PATCH = 6  # cells each way around the present configuration that are refined
+FINER = 4  # cells of a patch across one cell of its slice
 
 
 @dataclass(frozen=True)
-class Resolution:
-    """Cells of the images of the image loop."""
+class Cells:
+    """How many cells the images have along each axis."""
 
     slice: int = 64
     bar: int = 256
@@ -42,8 +45,8 @@ class Resolution:
 @dataclass(frozen=True)
 class Slice:
     """A plane through the present configuration. across, up: joints; x, y: (2,) its edges [rad];
-    cells: (nx, ny) uint8, see backend.cspace.cells; patch: the same around the present
-    configuration in finer cells, None where the slice is decided there.
+    cells: (nx, ny) uint8, see backend.cspace.cells; patch: finer cells around the present
+    configuration, None where all of the cells there are decided.
     """
 
     across: str
@@ -69,11 +72,12 @@ class OwnImage:
 
     eta: growth of the bodies for "certified free" [m]; q: (n,) the present joint values [rad];
     volume: (boom, stick, bucket) uint8 at the present swing over volume_edges (3, 2) [rad];
-    stopping: (n, 2) how far each joint still moves after a stop is asked for at its present rate,
-    latency included, and at its full rate [rad].
+    stopping: (n, 2) how far each joint still moves after a stop is asked for, latency included:
+    at its present rate (signed), at its full rate [rad].
     """
 
     own: str
+    partners: tuple[str, ...]
     state_time: float
     eta: float
     q: Array
@@ -82,8 +86,135 @@ class OwnImage:
     volume: AnyArray
     volume_edges: Array
     reach: ReachImage
+    tip_height: float | None
     stopping: Array
 
     @property
     def key(self) -> str:
         return self.own
+
+
+def own_machines(snapshot: Snapshot, config: Config) -> list[str]:
+    """Own machines whose surroundings are known now."""
+    return [name for name in config.own if known_surroundings(snapshot, config, name) is not None]
+
+
+def known_surroundings(snapshot: Snapshot, config: Config, own: str) -> Surroundings | None:
+    """None when the machine, or one that may be near it, is not valid: then nothing is certain."""
+    state = snapshot.machines[own]
+    if state.body is None or state.pose.validity is not Validity.VALID:
+        return None
+    partners = [pair for pair in snapshot.pairs if own in (pair.a, pair.b)]
+    if any(pair.reason for pair in partners):
+        return None
+    others = {}
+    for name, other in snapshot.machines.items():
+        if name != own and other.body is not None:
+            others[name] = (config.machines[name], other.body)
+    return surroundings(config.machines[own], state.body, others, config.site)
+
+
+def growth(snapshot: Snapshot, config: Config, own: str) -> float:
+    """eta of `own` and of the least certain partner together; the configured part counts once."""
+    others = [s.eta for name, s in snapshot.machines.items() if name != own]
+    return snapshot.machines[own].eta + max([eta - config.eta for eta in others], default=0.0)
+
+
+def own_image(
+    snapshot: Snapshot,
+    config: Config,
+    own: str,
+    cells: Cells,
+    tip_height: float | None = None,
+) -> OwnImage:
+    """The images of `own`; see OwnImage. tip_height: of the reach image, above the swing joint [m],
+    the present one when None. Raises ValueError when the surroundings of `own` are not known.
+    """
+    machine, state = config.machines[own], snapshot.machines[own]
+    around = known_surroundings(snapshot, config, own)
+    if around is None:
+        raise ValueError(f"the surroundings of {own} are not known")
+    q, layers = state.pose.joints, around.layers
+    models = cell_models(machine, q, growth(snapshot, config, own), joint_slack(state.pose))
+    edges = joint_edges(machine, q)
+    volume = _cells(models, layers, edges, q, dict.fromkeys((1, 2, 3), cells.volume))
+    return OwnImage(
+        own=own,
+        partners=tuple(name for name in snapshot.machines if name != own),
+        state_time=snapshot.state_time,
+        eta=models.eta,
+        q=q,
+        slices=tuple(_slice(models, layers, edges, q, plane, cells.slice) for plane in PLANES),
+        bars=tuple(
+            Bar(role, edges[k], _cells(models, layers, edges, q, {k: cells.bar}).ravel())
+            for k, role in enumerate(ARM)
+        ),
+        volume=volume[0],
+        volume_edges=edges[1:],
+        reach=reach_image(machine, q, around.boxes, cells.reach, tip_height),
+        tip_height=tip_height,
+        stopping=np.stack(
+            [
+                stopping_distances(machine, state.pose.joint_velocities, config.stop_latency),
+                full_stopping_distances(machine, config.stop_latency),
+            ],
+            axis=1,
+        ),
+    )
+
+
+def joint_edges(machine: Machine, q: Array) -> Array:
+    """(4, 2) limits of swing, boom, stick and bucket; a full turn about q where there are none."""
+    lower, upper = machine.lower[:4].copy(), machine.upper[:4].copy()
+    free = ~np.isfinite(lower) | ~np.isfinite(upper)
+    middle = np.where(np.arange(4) == 0, 0.0, q[:4])
+    lower[free], upper[free] = middle[free] - np.pi, middle[free] + np.pi
+    return np.stack([lower, upper], axis=1)
+
+
+def _slice(
+    models: CellModels,
+    layers: dict[str, Boxes],
+    edges: Array,
+    q: Array,
+    plane: tuple[int, int],
+    n: int,
+) -> Slice:
+    i, j = plane
+    found = _plane(models, layers, edges, q, plane, (n, n))
+    steps = np.diff(edges[[i, j]], axis=1).ravel() / n
+    here = np.array(cell_of(edges[[i, j], 0], steps, (n, n), q[[i, j]]))
+    first, last = np.maximum(here - PATCH, 0), np.minimum(here + PATCH + 1, n)
+    near = found.cells[first[0] : last[0], first[1] : last[1]]
+    if (near & (FREE | COLLIDING)).all():
+        return found
+    part = edges.copy()
+    part[[i, j], 0] = edges[[i, j], 0] + first * steps
+    part[[i, j], 1] = edges[[i, j], 0] + last * steps
+    size = (FINER * (last - first)).tolist()
+    patch = _plane(models, layers, part, q, plane, (size[0], size[1]))
+    return Slice(found.across, found.up, found.x, found.y, found.cells, patch)
+
+
+def _plane(
+    models: CellModels,
+    layers: dict[str, Boxes],
+    edges: Array,
+    q: Array,
+    plane: tuple[int, int],
+    shape: tuple[int, int],
+) -> Slice:
+    i, j = plane
+    cells = _cells(models, layers, edges, q, {i: shape[0], j: shape[1]}).reshape(shape)
+    return Slice(ARM[i], ARM[j], edges[i], edges[j], cells)
+
+
+def _cells(
+    models: CellModels, layers: dict[str, Boxes], edges: Array, q: Array, spread: dict[int, int]
+) -> AnyArray:
+    """Cells over the joints of `spread` (joint: cells), the others held at q."""
+    lower, upper, shape = q[:4].copy(), q[:4].copy(), [1, 1, 1, 1]
+    for k, n in spread.items():
+        lower[k], upper[k], shape[k] = edges[k, 0], edges[k, 1], n
+    grid = JointGrid(lower, upper, (shape[0], shape[1], shape[2], shape[3]))
+    return coded(models, grid, layers)

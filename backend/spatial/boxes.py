@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -47,3 +48,21 @@ class Boxes:
     def inflated(self, margin: float) -> Boxes:
         """Each box grown by `margin` [m] on every side (contains the Minkowski sum with a ball)."""
         return Boxes(self.centers, self.rotations, self.half_extents + margin)
+
+    def moved(self, T: Array) -> Boxes:
+        """The boxes in another frame. T: (4, 4) from theirs to that one."""
+        R = T[:3, :3]
+        return Boxes(self.centers @ R.T + T[:3, 3], R @ self.rotations, self.half_extents)
+
+
+NO_BOXES = Boxes(np.zeros((0, 3)), np.zeros((0, 3, 3)), np.zeros((0, 3)))
+
+
+def concatenated(parts: Iterable[Boxes]) -> Boxes:
+    """All boxes of one frame, in order; none when there are no parts."""
+    all_parts = [NO_BOXES, *parts]
+    return Boxes(
+        np.concatenate([p.centers for p in all_parts]),
+        np.concatenate([p.rotations for p in all_parts]),
+        np.concatenate([p.half_extents for p in all_parts]),
+    )
