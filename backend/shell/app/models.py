@@ -109,6 +109,36 @@ class AlarmModel(BaseModel):
     active: bool = Field(description="past its on-delay")
 
 
+class FreedomModel(BaseModel):
+    """One joint, one way. Bodies count as grown by eta."""
+
+    free: float = Field(description="to first contact or the joint's limit [rad]")
+    own: str | None = Field(description="own body that touches; null at a limit")
+    hits: str | None = Field(description="machine:body or site:name; null at a limit")
+    time_now: Unknown = Field(description="at the present rate; null when not moving that way [s]")
+    time_full: float = Field(description="at full rate [s]")
+    stop_now: float = Field(description="stopping distance from now, latency included [rad]")
+    stop_full: float = Field(description="the same from full rate [rad]")
+    can_stop: bool = Field(description="a stop from full rate ends before the contact")
+
+
+class MotionModel(BaseModel):
+    free: float = Field(description="until first contact or a limit as all joints move now [s]")
+    own: str | None
+    hits: str | None
+
+
+class MarginsModel(BaseModel):
+    """What a machine can do from here."""
+
+    eta: Unknown = Field(description="growth of the bodies; null when unknown [m]")
+    reason: str = Field(description="why it is not known, else empty")
+    joints: dict[str, dict[str, FreedomModel]] = Field(
+        description="by role: negative and positive; empty when unknown"
+    )
+    motion: MotionModel | None = Field(description="null at rest, or unknown")
+
+
 class ImageStampModel(BaseModel):
     state_time: float = Field(description="time of the state it shows, local monotonic clock [s]")
     ready_time: float = Field(description="when it was finished [s]")
@@ -130,6 +160,7 @@ class SnapshotModel(BaseModel):
     mode: str = Field(description="LIVE, DEMO or PLAYBACK")
     machines: dict[str, MachineModel]
     pairs: list[PairModel]
+    margins: dict[str, MarginsModel] = Field(description="by own machine")
     concerns: list[ConcernModel]
     alarms: list[AlarmModel] = Field(description="the severest first")
     images: dict[str, ImageStampModel] = Field(description="newest image by kind and pair")
