@@ -128,7 +128,7 @@ def own_image(
         ),
         volume=volume[0],
         volume_edges=edges[1:],
-        reach=reach_image(machine, q, around.boxes, cells.reach, tip_height),
+        reach=reach_image(machine, q, layers, cells.reach, tip_height),
         tip_height=tip_height,
         stopping=np.stack(
             [

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from pydantic import BaseModel, Field
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, Field
 
 Vector = list[float]
 Unknown = float | None
@@ -186,9 +188,41 @@ class TimingModel(BaseModel):
     rate: float = Field(description="achieved rate [Hz]")
 
 
+class WhatIfRequest(BaseModel):
+    """A posture to be judged. A joint that is not named stays where it is."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    machine: str = Field(description="a machine that this backend answers for")
+    joints: dict[str, Annotated[float, Field(ge=-100.0, le=100.0, allow_inf_nan=False)]] = Field(
+        description="the URDF's own joint values by role [rad]"
+    )
+
+
+class TouchModel(BaseModel):
+    own: str = Field(description="body of the machine, part/number")
+    other: str = Field(description="machine:part/number or site:name")
+    layer: str = Field(description="partner, site or self")
+
+
+class WhatIfModel(BaseModel):
+    """python-fcl's verdict on a posture, bodies as built."""
+
+    machine: str
+    joints: dict[str, float] = Field(description="as judged, by role [rad]")
+    state_time: Unknown = Field(description="of the surroundings, local monotonic clock [s]")
+    verdict: str = Field(description="FREE, COLLIDING or UNKNOWN")
+    reason: str = Field(description="why it is UNKNOWN, else empty")
+    distance: Unknown = Field(description="to what is closest, 0 on contact [m]")
+    closest: TouchModel | None
+    hits: list[TouchModel]
+    checked_by: str = Field(description="python-fcl")
+
+
 class BackendModel(BaseModel):
     step: TimingModel = Field(description="the fast loop: fusion, distances, concerns")
-    images: TimingModel = Field(description="the image loop: all pairs")
+    images: TimingModel = Field(description="the image loop: Sun's sets and the exact images")
+    zones: TimingModel = Field(description="the loop of driving zones and free regions")
     failure: str = Field(description="empty while both loops run")
 
 
