@@ -21,7 +21,7 @@ from backend.documents.snapshot import snapshot_document
 from backend.errors import InputError
 from backend.machine.load import load_machine
 from backend.machine.model import Machine
-from backend.pipeline.config import Config, SiteBodies
+from backend.pipeline.config import Config
 from backend.pipeline.images import SunParameters
 from backend.pipeline.records import Snapshot
 from backend.pipeline.whatif import what_if
@@ -38,6 +38,7 @@ from backend.shell.link.relay import Relay
 from backend.shell.link.session import open_session
 from backend.shell.link.source import LinkSource
 from backend.shell.runner import Runner
+from backend.site.bodies import site_bodies
 from backend.site.site import Site
 from backend.spatial.types import Array
 from cockpit.views.inputs import scene_site
@@ -94,7 +95,7 @@ def make_config(site: Site, models: dict[str, Machine], own: tuple[str, ...], mo
         limits=Limits(site.safety.slow_below, site.safety.stop_below),
         eta=site.safety.eta,
         mode=mode,
-        site=SiteBodies(site.obstacle_boxes(), tuple(obstacle.name for obstacle in site.obstacles)),
+        site=site_bodies(site),
     )
 
 

@@ -20,12 +20,15 @@ from backend.cspace.exact import (
     self_blocked,
     unpacked,
 )
+from backend.cspace.ground import GROUND
 from backend.machine.model import Machine
 from backend.spatial.boxes import Boxes
 from backend.spatial.types import AnyArray, Array, BoolArray
 
 SELF = "self"
-"""The layer of self-collision; the other layers are named by the caller ("partner", "site")."""
+"""The layer of self-collision; the other layers are named by the caller ("partner", "site").
+
+The layer "ground" is what the machine stands on: it does not count for the tracks."""
 
 SHAPE = (72, 64, 64, 64)
 
@@ -149,7 +152,9 @@ def _exact(
     model: ArmModel, grid: JointGrid, layers: Mapping[str, Boxes], own: AnyArray | None
 ) -> JointImage:
     _check(layers)
-    images = {name: blocked(model, grid, boxes, EXACT) for name, boxes in layers.items()}
+    images = {
+        name: blocked(model, grid, boxes, EXACT, name == GROUND) for name, boxes in layers.items()
+    }
     images[SELF] = self_blocked(model, grid, EXACT) if own is None else own
     return JointImage(grid, images)
 
@@ -166,8 +171,13 @@ def _certified(
     _check(layers)
     as_built = arm_model(machine, rest)
     grown = arm_model(machine, rest, eta)
-    outer = {name: blocked(grown, grid, boxes, OUTER) for name, boxes in layers.items()}
-    inner = {name: blocked(as_built, grid, boxes, INNER) for name, boxes in layers.items()}
+    outer = {
+        name: blocked(grown, grid, boxes, OUTER, name == GROUND) for name, boxes in layers.items()
+    }
+    inner = {
+        name: blocked(as_built, grid, boxes, INNER, name == GROUND)
+        for name, boxes in layers.items()
+    }
     if own is None:
         own = (
             self_blocked(grown, grid, OUTER)

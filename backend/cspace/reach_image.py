@@ -9,6 +9,7 @@ from enum import IntEnum
 import numpy as np
 
 from backend.cspace.exact_points import touching
+from backend.cspace.ground import GROUND
 from backend.machine import inverse
 from backend.machine.kinematics import end_point
 from backend.machine.model import Machine
@@ -106,7 +107,7 @@ def reach_image(
     asked = state == ReachState.FREE
     hit = {name: np.zeros(S.shape, dtype=bool) for name in (*layers, SELF)}
     for name, boxes in (*layers.items(), (SELF, NO_BOXES)):
-        against, itself = touching(machine, configurations[asked], boxes)
+        against, itself = touching(machine, configurations[asked], boxes, name == GROUND)
         hit[name][asked] = itself if name == SELF else against
     state[np.any(list(hit.values()), axis=0)] = ReachState.COLLIDING
     near = solution.reachable & (slack < NEAR)

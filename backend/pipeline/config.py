@@ -7,22 +7,7 @@ from dataclasses import dataclass
 from backend.fusion.crs import SiteFrame
 from backend.machine.model import Machine
 from backend.safety.partner import Limits
-from backend.spatial.boxes import NO_BOXES, Boxes
-
-
-@dataclass(frozen=True)
-class SiteBodies:
-    """Boxes that do not move, in the site frame, and their names."""
-
-    boxes: Boxes = NO_BOXES
-    names: tuple[str, ...] = ()
-
-    def __post_init__(self) -> None:
-        if len(self.names) != len(self.boxes):
-            raise ValueError(f"{len(self.boxes)} boxes have {len(self.names)} names")
-
-
-NO_SITE_BODIES = SiteBodies()
+from backend.site.bodies import NO_SITE_BODIES, SiteBodies
 
 
 @dataclass(frozen=True)

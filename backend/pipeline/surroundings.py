@@ -9,8 +9,9 @@ import numpy as np
 
 from backend.fusion.pose import Validity
 from backend.machine.model import Machine
-from backend.pipeline.config import Config, SiteBodies
+from backend.pipeline.config import Config
 from backend.pipeline.records import Body3D, MachineState, PairDistance
+from backend.site.bodies import SiteBodies
 from backend.spatial import transform
 from backend.spatial.boxes import Boxes, concatenated
 from backend.spatial.types import BoolArray
