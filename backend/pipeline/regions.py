@@ -4,13 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
+from backend.cspace.exact import JointGrid
 from backend.cspace.joint_image import certified4
 from backend.cspace.regions import cell_of, regions
 from backend.fusion.inflation import joint_slack
+from backend.machine.model import Machine
 from backend.pipeline.config import Config
-from backend.pipeline.records import Snapshot
+from backend.pipeline.records import MachineMargins, Snapshot
 from backend.pipeline.surroundings import growth, surroundings_of
 from backend.spatial.angles import wrap
+from backend.spatial.types import AnyArray, Array
 
 SHAPE = (48, 24, 24, 24)
 """Cells of swing, boom, stick and bucket."""
@@ -20,9 +25,9 @@ SHAPE = (48, 24, 24, 24)
 class RegionsImage:
     """Connected regions of the certified-free cells over swing, boom, stick and bucket.
 
-    Shares of all cells. free: certified free; present: whether the present configuration's cell is;
-    share: of the region that contains it; cut_off: regions that cannot be reached from it, and
-    cut_off_share their cells.
+    Shares of all cells. free: certified free; present: whether the present configuration is in one
+    of the regions, or comes into one by moving one joint within its margin; share: of what can be
+    reached so; cut_off: regions that cannot, and cut_off_share their cells.
     """
 
     own: str
@@ -50,20 +55,38 @@ def regions_image(
         growth(own, snapshot.machines, config),
     )
     image = certified4(machine, around.layers, eta, shape, pose.joints, slack=joint_slack(pose))
-    grid, q = image.grid, pose.joints[:4].copy()
-    continuous = machine.joints[0].continuous
-    if continuous:
-        q[0] = wrap(q[0])  # the grid begins at -pi
-    here = cell_of(grid.lower, grid.steps, shape, q)
-    found = regions(image.certified_free(), here, continuous)
+    found = regions(image.certified_free(), (0, 0, 0, 0), machine.joints[0].continuous)
+    reached = _reached(found.labels, image.grid, machine, pose.joints, snapshot.margins[own])
+    shares = found.sizes / found.labels.size
+    share = float(shares[[label - 1 for label in reached]].sum())
     return RegionsImage(
         own=own,
         state_time=snapshot.state_time,
         shape=shape,
         eta=eta,
         free=found.free,
-        present=found.present > 0,
-        share=found.share,
-        cut_off=len(found.cut_off),
-        cut_off_share=found.free - found.share,
+        present=bool(reached),
+        share=share,
+        cut_off=len(found.sizes) - len(reached),
+        cut_off_share=found.free - share,
     )
+
+
+def _reached(
+    labels: AnyArray, grid: JointGrid, machine: Machine, q: Array, margins: MachineMargins
+) -> list[int]:
+    """Labels of the regions that the present configuration is in, or comes into by moving one joint
+    within its margin: its own cell may be too near to something to be certified as a whole.
+    """
+    steps, continuous = grid.steps, machine.joints[0].continuous
+    found = set()
+    for joint, both in enumerate(margins.joints[:4]):
+        for sign, freedom in zip((-1.0, 1.0), both, strict=True):
+            count = max(int(freedom.free / steps[joint] * 2.0), 1)
+            for distance in np.linspace(0.0, freedom.free, count + 1)[:-1]:
+                there = q[:4].copy()
+                there[joint] += sign * distance
+                if continuous:
+                    there[0] = wrap(there[0])  # the grid begins at -pi
+                found.add(int(labels[cell_of(grid.lower, steps, grid.shape, there)]))
+    return sorted(found - {0})

@@ -135,7 +135,7 @@ def zone_frame(image: ZoneImage) -> bytes:
 def rings(zone: BaseGeometry) -> tuple[AnyArray, AnyArray]:
     """(k, 2) float32 vertices of all rings of (multi)polygons, (r, 2) int32 sizes and kinds."""
     vertices, sizes = [], []
-    for polygon in shapely.get_parts(zone):
+    for polygon in () if zone.is_empty else shapely.get_parts(zone):
         for k, ring in enumerate([polygon.exterior, *polygon.interiors]):
             points = shapely.get_coordinates(ring)[:-1]
             vertices.append(points)
