@@ -6,14 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from backend.cspace.exact import JointGrid
-from backend.cspace.joint_image import certified4
+from backend.cspace.exact import OUTER, JointGrid, arm_model, blocked, joint_grid, unpacked
 from backend.cspace.regions import cell_of, regions
 from backend.fusion.inflation import joint_slack
 from backend.machine.model import Machine
 from backend.pipeline.config import Config
 from backend.pipeline.records import MachineMargins, Snapshot
-from backend.pipeline.surroundings import growth, surroundings_of
+from backend.pipeline.static_layers import self_not_free, site_not_free
+from backend.pipeline.surroundings import PARTNER, growth, surroundings_of
 from backend.spatial.angles import wrap
 from backend.spatial.types import AnyArray, Array
 
@@ -50,13 +50,15 @@ def regions_image(
 ) -> RegionsImage:
     """Raises ValueError when `own` is not placed."""
     machine, pose = config.machines[own], snapshot.machines[own].pose
-    around, eta = (
-        surroundings_of(own, snapshot.machines, config),
-        growth(own, snapshot.machines, config),
-    )
-    image = certified4(machine, around.layers, eta, shape, pose.joints, slack=joint_slack(pose))
-    found = regions(image.certified_free(), (0, 0, 0, 0), machine.joints[0].continuous)
-    reached = _reached(found.labels, image.grid, machine, pose.joints, snapshot.margins[own])
+    eta, slack = growth(own, snapshot.machines, config), joint_slack(pose)
+    partners = surroundings_of(own, snapshot.machines, config).layers[PARTNER]
+    grid = joint_grid(machine, shape)
+    taken = blocked(arm_model(machine, pose.joints, eta), grid, partners, OUTER)
+    taken |= site_not_free(machine, pose, config.site, eta, shape)
+    taken |= self_not_free(machine, pose.joints, slack, shape)
+    free = ~unpacked(taken, shape[3])
+    found = regions(free, (0, 0, 0, 0), machine.joints[0].continuous)
+    reached = _reached(found.labels, grid, machine, pose.joints, snapshot.margins[own])
     shares = found.sizes / found.labels.size
     share = float(shares[[label - 1 for label in reached]].sum())
     return RegionsImage(
