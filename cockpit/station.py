@@ -239,7 +239,10 @@ class Station:
             return
         with contextlib.suppress(ValueError, InputError):
             if kind == "ghost":
-                self._ghost(name, message.get("joints"), page)
+                joints = message.get("joints")
+                self.view.set_ghost(name, joints if isinstance(joints, dict) else None, page)
+            elif kind == "zones":
+                self.view.set_zone_kind(str(message.get("kind")), page)
             elif not isinstance(name, str):
                 return
             elif kind == "camera":
@@ -255,9 +258,6 @@ class Station:
             self._tip_heights.pop(own, None)
         elif isinstance(height, int | float) and abs(height) < MAX_HEIGHT:
             self._tip_heights[own] = float(height)
-
-    def _ghost(self, own: Any, joints: Any, page: str | None) -> None:
-        pass
 
 
 def _resolutions(
