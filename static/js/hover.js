@@ -1,6 +1,7 @@
-// One tooltip for all plots: values with units under the pointer.
+// One tooltip for all plots: values with units under the pointer; and what is pointed at, for the ghost.
 
 import { $, write } from "./words.js";
+import { hovered, pin } from "./ghost.js";
 
 let over = null; // {surface, x, y, clientX, clientY}
 
@@ -10,7 +11,9 @@ export function watch(surface) {
     const box = canvas.getBoundingClientRect();
     over = { surface, x: event.clientX - box.left, y: event.clientY - box.top, clientX: event.clientX, clientY: event.clientY };
     refresh();
+    hovered(surface.aim?.(over.x, over.y) ?? null);
   };
+  canvas.addEventListener("click", () => over && pin(surface.aim?.(over.x, over.y) ?? null));
   canvas.addEventListener("pointermove", move);
   canvas.addEventListener("pointerdown", move);
   canvas.addEventListener("pointerleave", hide);
@@ -18,6 +21,7 @@ export function watch(surface) {
 
 export function hide() {
   over = null;
+  hovered(null);
   $("hover").hidden = true;
 }
 

@@ -168,7 +168,11 @@ export function iso(g, own) {
 export function exitArrow(g, own, zone) {
   if (zone.length < 3 || !own.position || !inside(own.position, zone)) return null;
   const { distance, point } = edgeDistance(own.position, zone);
-  const [x0, y0] = chart.at(own.position), [x1, y1] = chart.at(point);
+  return drawArrow(g, own.position, point, distance);
+}
+
+export function drawArrow(g, from, to, distance) {
+  const [x0, y0] = chart.at(from), [x1, y1] = chart.at(to);
   const a = Math.atan2(y1 - y0, x1 - x0);
   for (const [w, colour] of [[5, C.halo], [2.5, C.text]]) {
     segment(g, x0, y0, x1, y1, colour, w);
