@@ -32,6 +32,7 @@ export const jointKind = {
 };
 export const reachKind = {
   name: "reach",
+  partner: PARTNER,
   layers: REACH_LAYERS,
   hits: (b) => b & 7,
   undecided: () => false,
@@ -64,7 +65,7 @@ function colours(kind, { hatches, side }, byte) {
   for (let p = 0; p < cells.length; p++) {
     let c = rgb(outside || plain === "out" || plain === "beyond" ? C.outside : C.free);
     if (plain === "beyond" && on("|", p)) c = mix(c, rgb(C.edge), 0.35);
-    if (plain === "near") c = mix(c, rgb(C.edge), on("-", p) ? 0.3 : 0.06);
+    if (plain === "near") c = mix(c, rgb(C.edge), on("-", p) ? 0.5 : 0.06);
     if (undecided && on("checker", p)) c = mix(c, rgb(C.undecided), hit.length ? 0.25 : 1);
     if (hit.length) c = mix(c, rgb(hit[0].colour), undecided ? 0.18 : 0.35);
     for (const layer of [...hit].reverse()) if (on(layer.hatch, p)) c = mix(c, rgb(layer.colour), 0.85);

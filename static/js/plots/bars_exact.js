@@ -53,7 +53,7 @@ function stops(g, entry, r, left, right, y, thick) {
       g.setLineDash(dash ?? []);
       g.lineWidth = w;
       g.strokeStyle = colour;
-      g.strokeRect(Math.min(a, b), Math.round(y - thick / 2) - 2.5, Math.abs(b - a), thick + 5);
+      g.strokeRect(Math.min(a, b), Math.round(y - thick / 2) - 1.5, Math.abs(b - a), thick + 3);
     }
     g.setLineDash([]);
   }
@@ -70,15 +70,15 @@ export function paint(g, width, height, dpr) {
   const joints = described(state.own).joints.filter(({ role }) => header.bars.some((bar) => bar.joint === role));
   const m = machine(state.own);
   const t3 = size("t3"), t = size("tick");
-  const left = Math.round(3.9 * t3 + 3 * t), right = width - Math.round(3.9 * t3 + 3 * t);
+  const left = Math.round(3.9 * t3 + 3.2 * t), right = width - Math.round(3.9 * t3 + 3 * t);
   const foot = Math.round(1.25 * t);
   const pitch = (height - foot) / joints.length;
-  const thick = Math.round(Math.min(0.9 * t3, pitch * 0.42));
+  const thick = Math.round(Math.min(0.9 * t3, pitch - t - 6)); // a line of text stands below each
   const stale = m.validity !== "VALID", old = imageStale(entry);
   const drawn = {};
   rows = joints.map((joint, i) => {
     const r = row(joint);
-    const y = Math.round(pitch * i + thick / 2 + 5);
+    const y = Math.round(pitch * i + thick / 2 + 4);
     r.q = m.joints[r.role];
     r.sign = r.role === "swing" ? Math.sign(fromLeft(state.own, 1) - fromLeft(state.own, 0)) || 1 : 1;
     r.map = r.reversed ? scale(r.upper, r.lower, left, right) : scale(r.lower, r.upper, left, right);
@@ -97,11 +97,12 @@ export function paint(g, width, height, dpr) {
     label(g, text(ends[1]), right + 5, y, { base: "middle" });
     label(g, `${number(deg(r.now), 1)}°`, width - 8, y, { align: "right", base: "middle", colour: stale ? C.stale : C.text, name: "t3", weight: 600 });
     const given = told() ? ways(state.own, r.role) : [];
-    given.forEach((way, k) => margin(g, way, k, k ? right : left, Math.round(y + thick / 2 + 4), (right - left) / 2 - 12, t));
     const bytes = counts(arrays[`bar${header.bars.findIndex((bar) => bar.joint === r.role)}`], jointKind, count);
     drawn[r.role] = { ...bytes, stop, margins: given.map((way) => (Number.isFinite(way?.free) ? [Math.round(way.free * 1e4) / 1e4, way.hits] : null)), cannot_stop: given.map(cannotStop) };
     return { ...r, y, ways: given, stop };
   });
+  // After all bars: the dashed box of the next one must not cross the words.
+  for (const r of rows) r.ways.forEach((way, k) => margin(g, way, k, k ? right : left, Math.round(r.y + thick / 2 + 2), (right - left) / 2 - 12, t));
   const has = (name) => Object.values(drawn).some((d) => d[name]);
   const layers = presentLayers(Object.fromEntries(jointKind.layers.map(({ name }) => [name, has(name)])));
   legend(g, 8, height - 0.65 * t, width - 12, [
@@ -123,7 +124,7 @@ function margin(g, way, side, x, y, width, t) {
   const texts = wayTexts(state.own, way).map((text) => (side ? text + arrow : arrow + text));
   const shift = red ? t + 3 : 0;
   if (red) levelMark(g, "STOP", side ? x - t / 2 : x + t / 2, y + 0.45 * t, 0.5 * t);
-  fit(g, texts, side ? x - shift : x + shift, y, width - shift, { align: side ? "right" : "left", base: "top", colour: red ? C.stopLine : C.second, weight: red ? 700 : 400 });
+  fit(g, texts, side ? x - shift : x + shift, y, width - shift, { align: side ? "right" : "left", base: "top", colour: red ? C.stopLine : C.second, weight: red ? 700 : 400, halo: true });
 }
 
 const nearest = (y) => rows.reduce((a, b) => (Math.abs(b.y - y) < Math.abs(a.y - y) ? b : a));

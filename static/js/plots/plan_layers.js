@@ -223,7 +223,10 @@ export function base(g, name) {
   cross(g, x, y, name === state.own ? "#FFFFFF" : tint(name), name === state.own ? 7 : 5);
   const above = state.partner && m.position[1] >= Math.max(...[state.own, state.partner].map((k) => machine(k)?.position?.[1] ?? -Infinity));
   const r = (m.max_reach ?? 4) * 0.36 * chart.px + size("tick");
-  label(g, nameOf(name), x, above ? y - r : y + r, { align: "center", base: "middle", colour: tint(name), weight: 600, halo: true });
+  // Outwards, so that the distance has its place between the two names.
+  const other = machine(name === state.own ? state.partner : state.own);
+  const out = other?.position && machine(name) !== other ? Math.sign(x - chart.at(other.position)[0]) * 1.2 * size("tick") : 0;
+  label(g, nameOf(name), x + out, above ? y - r : y + r, { align: "center", base: "middle", colour: tint(name), weight: 600, halo: true });
 }
 
 export function north(g, turn) {

@@ -2,10 +2,10 @@
 
 import { C, size } from "../theme.js";
 import { degrees, metres, number, scale, ticks } from "../axis.js";
-import { clear, fit, label, legend, segment } from "../pen.js";
+import { clear, fit, label, legend, segment, swatches } from "../pen.js";
 import { star } from "../glyphs.js";
 import { count, layerBits, paintBytes, paintVeil, reachKind, swatch } from "../layers.js";
-import { cellLines, counts, fromLeft, layerWord, middles, presentLayers, reachByte, sample, toLeft } from "../exact.js";
+import { cellLines, counts, fromLeft, layerWord, middles, partnersText, presentLayers, reachByte, sample, toLeft } from "../exact.js";
 import { described, exactImage, image, imageAge, imageStale, label as nameOf, machine, state, swingAt } from "../state.js";
 import { picking } from "../tip.js";
 import { shown } from "../view.js";
@@ -29,7 +29,7 @@ function sunBlocks(sun, q, d) {
 function compare(entry, sun) {
   const { swing, reach } = entry.header.reach;
   const { data, shape: [nx, ny] } = entry.arrays.reach;
-  const found = { cells: 0, both: 0, only_sun: 0, only_exact: 0 };
+  const found = { cells: 0, both: 0, only_sun: 0, only_exact: 0, only_exact_partner: 0 };
   for (let i = 0; i < nx; i++) {
     const q = swing[0] + ((i + 0.5) / nx) * (swing[1] - swing[0]);
     const from = sun ? blockedFrom(sun, toLeft(state.own, q) - swingAt(state.own, 0)) : null;
@@ -40,7 +40,10 @@ function compare(entry, sun) {
       const ours = reachKind.hits(b) !== 0, his = from !== null && d > from;
       found.cells += 1;
       if (ours && his) found.both += 1;
-      else if (ours) found.only_exact += 1;
+      else if (ours) {
+        found.only_exact += 1;
+        if (b & reachKind.partner) found.only_exact_partner += 1; // Sun's method knows the partner only
+      }
       else if (his) found.only_sun += 1;
     }
   }
@@ -118,24 +121,25 @@ export function paint(g, width, height, dpr) {
   for (const value of ticks(0, top, 6)) label(g, number(value, 0), box.left - 5, Math.round(mapY(value)) + 0.5, { align: "right", base: "middle" });
   fit(g, titles(header.reach), 6, 2, width - 10, { base: "top", colour: C.text });
 
+  const classes = counts(entry.arrays.reach, reachKind, count);
   const x = toLeft(state.own, header.q.swing), d = own?.reach;
   if (Number.isFinite(d)) star(g, mapX(x), mapY(Math.min(d, top)), stale);
   label(g, "tip distance, m ↑", box.left + 5, box.top + 3, { base: "top", halo: true });
+  if (classes.out) label(g, "out of reach", box.right - 5, box.top + 3, { align: "right", base: "top", halo: true });
   label(g, "← swing left", box.left + 5, box.bottom - 4, { base: "bottom", halo: true });
   label(g, "right →", box.right - 5, box.bottom - 4, { align: "right", base: "bottom", halo: true });
   const waiting = picking(state.own, header.reach);
   if (waiting !== null && !stale) label(g, `computing ${number(waiting, 1)} s`, box.left + wide / 2, box.bottom - 4, { align: "center", base: "bottom", colour: C.text, halo: true });
   else ageNote(g, box.left + wide / 2, box.bottom - 4, age, stale, { align: "center", name: stale ? "t3" : "tick" });
 
-  const classes = counts(entry.arrays.reach, reachKind, count);
   const share = (n) => `${number((100 * n) / Math.max(1, compared.cells), n && n < 0.1 * compared.cells ? 1 : 0)} %`;
   const layers = presentLayers(classes, reachKind).map((layer) => [swatch.layer(g, layer, dpr), layerWord(layer, header)]);
   const limits = [
-    ...(classes.near ? [[swatch.byte(g, layerBits.near, reachKind, dpr), "near limit"]] : []),
     ...(classes.beyond ? [[swatch.byte(g, layerBits.beyond, reachKind, dpr), "limit"]] : []),
+    ...(classes.near ? [[swatch.byte(g, layerBits.near, reachKind, dpr), width < 300 ? "near" : "near limit"]] : []),
     ...(classes.out ? [[swatch.byte(g, layerBits.out, reachKind, dpr), "out of reach"]] : []),
   ];
-  legend(g, 6, height - 0.65 * t, width - 8, compared ? [[swatch.sun(), sun ? `only Sun ${share(compared.only_sun)}` : "Sun: no image"], ...(sun ? [[layers[0]?.[0] ?? swatch.free(), `only exact ${share(compared.only_exact)}`]] : layers)] : [...layers, ...limits], width < 300 ? 5 : 10);
+  legend(g, 6, height - 0.65 * t, width - 8, compared ? [[swatch.sun(), sun ? `only Sun ${share(compared.only_sun)}` : "Sun: no image"], ...(sun ? [[layers[0]?.[0] ?? swatch.free(), `only exact ${share(compared.only_exact)}`], [swatches.glyph(() => {}), `of which ${partnersText(header)} ${share(compared.only_exact_partner)}`]] : layers)] : [...layers, ...limits], width < 300 ? 5 : 10);
   const here = Number.isFinite(d) ? reachByte(entry, header.q.swing, d) : null;
   return {
     state: {

@@ -18,7 +18,7 @@ const round = (value) => (Number.isFinite(value) ? Math.round(value * 1e4) / 1e4
 
 export function sliceExact(index) {
   const raster = document.createElement("canvas");
-  let box, mapX, mapY, bytes, pixels, bits, cached = "", w = 0, h = 0, sunCells = 0;
+  let box, mapX, mapY, bytes, pixels, bits, cached = "", w = 0, h = 0, sunCells = 0, mask = null;
 
   function limits(role, edges) {
     const joint = described(state.own)?.joints.find((j) => j.role === role);
@@ -57,10 +57,11 @@ export function sliceExact(index) {
     if (slice.patch) sample(bytes, w, h, columns, rows, slice.patch, entry.arrays[`patch${index}`], { over: true });
     paintBytes(bytes, w, h, bits, dpr, jointKind);
     sunCells = 0;
+    mask = null;
     const xs = sun?.arrays[slice.across], ys = sun?.arrays[slice.up];
     if (xs?.data.length && ys?.data.length) {
       const a = sunMap(state.own, slice.across), b = sunMap(state.own, slice.up);
-      const mask = new Uint8Array(w * h);
+      mask = new Uint8Array(w * h);
       sunCells = fillMesh(mask, w, h, xs.data, ys.data, xs.shape[0], xs.shape[1],
         (s) => (mapX((s - a.offset) * a.sign) - box.left) * dpr, (s) => (mapY((s - b.offset) * b.sign) - box.top) * dpr);
       paintVeil(mask, w, h, bits, dpr);
@@ -100,11 +101,13 @@ export function sliceExact(index) {
     const near = slice.patch ? counts(arrays[`patch${index}`], jointKind, count) : {};
     const has = (name) => (classes[name] ?? 0) + (near[name] ?? 0);
     const present = presentLayers(Object.fromEntries(jointKind.layers.map(({ name }) => [name, has(name)])));
-    legend(g, 6, height - 0.65 * t, width - 8, [
-      ...(difference ? [[swatch.sun(), sunCells ? "Sun, projection" : "Sun: nothing"]] : []),
+    legend(g, 6, height - 0.65 * t, width - 8, difference ? [
+      [swatch.sun(), !sunCells ? "Sun: nothing" : roomy ? "Sun: projection" : "projection"],
+      [present.length ? swatch.layer(g, present[0], dpr) : swatch.free(), roomy ? "exact: slice" : "slice"],
+    ] : [
       ...present.map((layer) => [swatch.layer(g, layer, dpr), layerWord(layer, header)]),
       ...(has("undecided") ? [[swatch.undecided(g, dpr), "undecided"]] : []),
-    ], roomy ? 10 : 5);
+    ], roomy ? 9 : 5);
     ageNote(g, box.left + 5, box.bottom - 4, age, stale);
     return {
       state: {
@@ -145,6 +148,7 @@ export function sliceExact(index) {
     return [
       `${across} ${degrees(values[0], 1)}, ${up} ${degrees(values[1], 1)}`,
       ...(aim(x, y) ? cellLines(sliceByte(entry, index, ...values), header, jointKind) : ["beyond a joint limit"]),
+      ...(mask ? [mask[Math.min(h - 1, Math.floor(((y - box.top) * h) / (box.bottom - box.top))) * w + Math.min(w - 1, Math.floor(((x - box.left) * w) / (box.right - box.left)))] ? "in Sun's projection" : "outside Sun's projection"] : []),
       `slice at ${jointsText(state.own, header.q, others)}`,
       `now ${degrees(header.q[across])}, ${degrees(header.q[up])} · bodies grown by ${(100 * header.eta).toFixed(0)} cm · ${ageText(imageAge(entry))}`,
     ];
