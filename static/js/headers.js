@@ -45,5 +45,6 @@ export function update() {
   motionText(m ? widest($("motion"), [m.text, m.text.replace("on this motion ", "")]) : "", m?.known);
   mark($("motion"), "seconds", m?.seconds ?? "");
   mark($("motion"), "known", m ? m.known : "");
-  regionText(widest($("regions"), regionTexts()), state.own);
+  const texts = regionTexts();
+  regionText(widest($("regions"), texts), `${state.own} ${texts.length}`);
 }

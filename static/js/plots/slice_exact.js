@@ -2,7 +2,7 @@
 
 import { C, size } from "../theme.js";
 import { DEGREE_STEPS, deg, degrees, scale, ticks } from "../axis.js";
-import { clear, fit, label, legend, segment } from "../pen.js";
+import { clear, fit, label, legend, legendWidth, segment } from "../pen.js";
 import { fillMesh } from "../mesh.js";
 import { star } from "../glyphs.js";
 import { count, jointKind, paintBytes, paintVeil, swatch } from "../layers.js";
@@ -101,13 +101,14 @@ export function sliceExact(index) {
     const near = slice.patch ? counts(arrays[`patch${index}`], jointKind, count) : {};
     const has = (name) => (classes[name] ?? 0) + (near[name] ?? 0);
     const present = presentLayers(Object.fromEntries(jointKind.layers.map(({ name }) => [name, has(name)])));
-    legend(g, 6, height - 0.65 * t, width - 8, difference ? [
+    const entries = difference ? [
       [swatch.sun(), !sunCells ? "Sun: nothing" : roomy ? "Sun: projection" : "projection"],
       [present.length ? swatch.layer(g, present[0], dpr) : swatch.free(), roomy ? "exact: slice" : "slice"],
     ] : [
       ...present.map((layer) => [swatch.layer(g, layer, dpr), layerWord(layer, header)]),
-      ...(has("undecided") ? [[swatch.undecided(g, dpr), "undecided"]] : []),
-    ], roomy ? 9 : 5);
+    ];
+    if (!difference && has("undecided")) entries.push(["undecided", "undec."].map((word) => [swatch.undecided(g, dpr), word]).find((entry, i) => i || legendWidth(g, [...entries, entry], 6) <= width - 8));
+    legend(g, 6, height - 0.65 * t, width - 8, entries, roomy ? 6 : 5);
     ageNote(g, box.left + 5, box.bottom - 4, age, stale);
     return {
       state: {

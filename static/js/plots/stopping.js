@@ -7,13 +7,16 @@ import { stopsInBlocked } from "../exact.js";
 const clamp = (v, a, b) => Math.min(Math.max(v, Math.min(a, b)), Math.max(a, b));
 const STILL = 0.002; // rad; below it nothing is drawn
 
-/** A line with a T at its end, black-edged so that it is seen on every layer. */
+/** A line with a T at its end, black-edged so that it is seen on every layer; what is red has a second bar, too. */
 export function tee(g, x0, y0, x1, y1, red, half = 6) {
   const along = Math.abs(x1 - x0) > Math.abs(y1 - y0);
+  const back = 6 * Math.sign(along ? x0 - x1 : y0 - y1);
   for (const [w, colour] of [[6, "#000000"], [3, red ? C.stopLine : "#FFFFFF"]]) {
     segment(g, x0, y0, x1, y1, colour, w);
-    if (along) segment(g, x1, y1 - half, x1, y1 + half, colour, w);
-    else segment(g, x1 - half, y1, x1 + half, y1, colour, w);
+    for (const shift of red ? [0, back] : [0]) {
+      if (along) segment(g, x1 + shift, y1 - half, x1 + shift, y1 + half, colour, w);
+      else segment(g, x1 - half, y1 + shift, x1 + half, y1 + shift, colour, w);
+    }
   }
 }
 
