@@ -2,13 +2,13 @@
 
 import { $, make, mark, partName, write } from "./words.js";
 import { metres, seconds } from "./axis.js";
-import { label } from "./state.js";
+import { label, state } from "./state.js";
 import { jointsText, obstacle } from "./exact.js";
 import { page } from "./scene.js";
 
 const PERIOD = 100; // ms between two messages, the latest wins
 
-let send = () => {};
+let send = () => {}, changed = () => {};
 let last = -Infinity, timer = null, waiting = null, showing = false;
 let pinned = null; // {machine, joints, serial}
 let verdict = null; // the answer, with `at` [ms]
@@ -80,6 +80,7 @@ export function verdictText(own, answer) {
 function card() {
   const box = $("pin");
   box.hidden = pinned === null;
+  changed();
   if (!pinned) return;
   const own = pinned.machine;
   mark(box, "verdict", verdict?.verdict ?? "CHECKING");
@@ -99,12 +100,14 @@ export function age() {
   const parts = verdict ? [
     ...(verdict.verdict === "COLLIDING" && Number.isFinite(verdict.distance) ? [`distance ${metres(verdict.distance)}`] : []),
     ...(verdict.checked_by ? [`checked by ${verdict.checked_by} ${seconds((performance.now() - verdict.at) / 1000)} ago`] : []),
-  ] : ["asking for a second opinion"];
+  ] : ["asking python-fcl"];
   write($("pin-check"), [...parts, "Esc clears"].join(" · "));
 }
 
-export const pinnedAim = () => pinned;
-export const startGhost = (give) => {
+/** The pinned joints when they were pinned on that plot of the own machine. */
+export const pinnedFrom = (from) => (pinned?.from === from && pinned.machine === state.own ? pinned.joints : null);
+export const startGhost = (give, redraw) => {
   send = give;
+  changed = redraw;
   $("pin-close").addEventListener("click", unpin);
 };

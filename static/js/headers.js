@@ -40,11 +40,12 @@ export function update() {
   }
   for (const id of ["tip-down", "tip-now", "tip-up"]) $(id).hidden = !exact;
   $("reach-mode").hidden = exact;
-  mark($("reach-panel"), "exact", switchable() ? 1 : 0);
+  mark($("reach-panel"), "exact", exact ? 1 : 0);
+  const texts = regionTexts();
   const m = motion(state.own);
   motionText(m ? widest($("motion"), [m.text, m.text.replace("on this motion ", "")]) : "", m?.known);
+  if (texts.length) $("regions").title = texts[0];
   mark($("motion"), "seconds", m?.seconds ?? "");
   mark($("motion"), "known", m ? m.known : "");
-  const texts = regionTexts();
   regionText(widest($("regions"), texts), `${state.own} ${texts.length}`);
 }

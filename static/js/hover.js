@@ -38,6 +38,10 @@ export function refresh() {
   tip.hidden = false;
   const { offsetWidth: w, offsetHeight: h } = tip;
   const x = over.clientX + 18 + w > innerWidth ? over.clientX - 18 - w : over.clientX + 18;
-  const y = over.clientY + 18 + h > innerHeight ? over.clientY - 18 - h : over.clientY + 18;
+  // Nothing covers the alarm line.
+  const alarm = $("alarm").getBoundingClientRect();
+  const fits = (at) => at >= 2 && at + h <= innerHeight - 2 && (at + h <= alarm.top || at >= alarm.bottom);
+  const below = over.clientY + 18, above = over.clientY - 18 - h;
+  const y = [below, above, alarm.top - h, alarm.bottom].find(fits) ?? below;
   tip.style.transform = `translate(${Math.max(2, Math.round(x))}px, ${Math.max(2, Math.round(y))}px)`;
 }

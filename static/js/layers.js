@@ -103,6 +103,14 @@ export function paintBytes(bytes, w, h, out, dpr, kind) {
   }
 }
 
+/** What is stale loses its colour. */
+export function fade(out) {
+  for (let p = 0; p < out.length; p++) {
+    const c = out[p], v = 0.3 * (c & 255) + 0.59 * ((c >> 8) & 255) + 0.11 * ((c >> 16) & 255);
+    out[p] = pack([v, v, v]);
+  }
+}
+
 /** Sun's set over the exact one: a light veil with a white outline of 2 px, hatches shining through. */
 export function paintVeil(mask, w, h, out, dpr) {
   const rim = Math.max(1, Math.round(2 * dpr));

@@ -108,7 +108,7 @@ const socket = connect(`${scheme}//${location.host}/ws`, onFrame, (word) => {
   state.socket = word;
 });
 tip.startTip(socket.send);
-ghost.startGhost(socket.send);
+ghost.startGhost(socket.send, redraw);
 headers.startHeaders(switchImages);
 
 function onFrame(header, arrays) {

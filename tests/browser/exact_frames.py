@@ -14,6 +14,7 @@ Q = {"swing": math.radians(30), "boom": 0.5, "stick": -1.0, "bucket": 0.2}
 PAIRS = (("boom", "stick"), ("boom", "bucket"), ("stick", "bucket"))
 PARTNER, SITE, SELF, FREE, COLLIDING = 1, 2, 4, 64, 128
 CELLS = 48
+PATCH = (0.45, 0.65)  # of the joints' ranges
 
 
 def certified(layers: np.ndarray) -> np.ndarray:
@@ -52,7 +53,9 @@ def bar_cells(n: int, blocked: list[tuple[float, float, int]]) -> np.ndarray:
     return certified(layers)
 
 
-def reach_cells(n: int, m: int, swing: tuple[float, float], reach: tuple[float, float]) -> np.ndarray:
+def reach_cells(
+    n: int, m: int, swing: tuple[float, float], reach: tuple[float, float]
+) -> np.ndarray:
     """The partner from 2.8 m on between 55 and 100 degrees, a wall, limits, out of reach."""
     s = np.degrees(swing[0] + (np.arange(n) + 0.5) / n * (swing[1] - swing[0]))[:, None]
     d = (reach[0] + (np.arange(m) + 0.5) / m * (reach[1] - reach[0]))[None, :] + 0 * s
@@ -68,6 +71,10 @@ def reach_cells(n: int, m: int, swing: tuple[float, float], reach: tuple[float, 
     return out
 
 
+def share(span: tuple[float, float], part: tuple[float, float]) -> list[float]:
+    return [span[0] + p * (span[1] - span[0]) for p in part]
+
+
 def exact(state_time: float, *, own: str = "left", **changes: Any) -> bytes:
     arrays: dict[str, np.ndarray] = {}
     slices = []
@@ -77,10 +84,8 @@ def exact(state_time: float, *, own: str = "left", **changes: Any) -> bytes:
         patch = None
         if i == 0:
             # The middle fifth of the rectangle, four times as fine.
-            low, high = 0.45, 0.65
-            arrays["patch0"] = slice_cells((low, high), (low, high), 40, 0)
-            ends = lambda r: [r[0] + low * (r[1] - r[0]), r[0] + high * (r[1] - r[0])]  # noqa: E731
-            patch = {"x": ends(x), "y": ends(y)}
+            arrays["patch0"] = slice_cells(PATCH, PATCH, 40, 0)
+            patch = {"x": share(x, PATCH), "y": share(y, PATCH)}
         slices.append({"across": across, "up": up, "x": list(x), "y": list(y), "patch": patch})
     edges = {"swing": (-math.pi, math.pi), **LIMITS}
     blocked: dict[str, list[tuple[float, float, int]]] = {

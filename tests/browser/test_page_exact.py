@@ -6,6 +6,7 @@ import json
 import math
 import time
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -51,7 +52,11 @@ class ExactFeed(Feed):
         pytest.fail(f"the page did not get there: {self.shown('slice-0')}, {self.shown('plan')}")
 
     def exact_ready(self) -> bool:
-        return self.shown("slice-0").get("kind") == "slice" and bool(self.shown("plan").get("zones"))
+        drawn = self.shown("slice-0").get("kind") == "slice"
+        return drawn and bool(self.shown("plan").get("zones"))
+
+    def shows(self, mode: str) -> bool:
+        return bool(self.shown("reach").get("shown", "sun") == mode)
 
     def of(self, kind: str) -> list[dict[str, Any]]:
         return [m for m in self.sent if m["type"] == kind]
@@ -73,9 +78,9 @@ def feed(browser: Browser) -> Iterator[ExactFeed]:
 @pytest.mark.parametrize("size", SIZES, ids=lambda s: f"{s[0]}x{s[1]}")
 def test_screenshots(browser: Browser, size: tuple[int, int], artifacts: Path) -> None:
     feed = ExactFeed(browser, *size)
+    feed.send(feed.exact_ready)
     for mode in ("exact", "sun", "difference"):
-        feed.send(lambda mode=mode: feed.exact_ready() if mode == "exact" else True)
-        feed.send(lambda mode=mode: feed.shown("reach").get("shown", "sun") == mode)
+        feed.send(partial(feed.shows, mode))
         feed.page.screenshot(path=artifacts / f"page-{mode}-{size[0]}x{size[1]}.png")
         feed.page.keyboard.press("x")
     assert feed.errors == []
@@ -86,7 +91,7 @@ CLIPPED = """() => [...document.querySelectorAll("#top *, #alarm *, .panel > hea
   .filter(n => n.children.length === 0 && n.checkVisibility()
     && n.scrollWidth > n.clientWidth + 1 && n.clientWidth > 0)
   .map(n => n.id || n.textContent)"""
-OUTSIDE = """() => [...document.querySelectorAll("main, section, header, canvas, button, .age, #pin")]
+OUTSIDE = """() => [...document.querySelectorAll("main, section, header, canvas, button, #pin")]
   .filter(n => n.checkVisibility()).filter(n => { const r = n.getBoundingClientRect();
     const p = n.closest(".panel")?.getBoundingClientRect() ?? {left: 0, top: 0, right: innerWidth,
       bottom: innerHeight};
@@ -262,6 +267,8 @@ def test_a_click_pins_the_verdict_and_escape_clears_it(feed: ExactFeed) -> None:
     assert "−0.05 m" in card
     assert asked[0]["machine"] == "left"
     assert asked[0]["joints"]["boom"] == pytest.approx(Q["boom"])
+    pinned = [asked[0]["joints"][role] for role in ("stick", "bucket")]
+    feed.send(lambda: feed.shown("slice-2")["pinned"] == pytest.approx(pinned, abs=1e-3))
     # The pinned ghost stays where it is, whatever the pointer does.
     feed.page.mouse.move(*feed.at("slice-0", 0.5, 0.5))
     feed.page.mouse.move(*feed.at("alarm", 0.5, 0.5))
@@ -349,7 +356,11 @@ def test_the_tip_height_is_asked_for_and_waited_for(feed: ExactFeed) -> None:
     assert feed.of("tip_height")[-1]["height"] is None
 
 
-def test_old_images_are_stale_and_never_look_current(feed: ExactFeed, artifacts: Path) -> None:
+@pytest.mark.parametrize("size", SIZES, ids=lambda s: f"{s[0]}x{s[1]}")
+def test_old_images_are_stale_and_never_look_current(
+    browser: Browser, size: tuple[int, int], artifacts: Path
+) -> None:
+    feed = ExactFeed(browser, *size)
     feed.send(feed.exact_ready)
     feed.images = False
     feed.send(
@@ -362,9 +373,12 @@ def test_old_images_are_stale_and_never_look_current(feed: ExactFeed, artifacts:
     )
     assert "unknown" in feed.page.inner_text("#regions")
     assert float(feed.page.get_attribute("#slice-0", "data-age") or 0) > 1.0
-    feed.page.screenshot(path=artifacts / "page-stale-1920x1080.png")
+    assert feed.page.evaluate(CLIPPED) == []
+    assert feed.page.evaluate(OUTSIDE) == []
+    feed.page.screenshot(path=artifacts / f"page-stale-{size[0]}x{size[1]}.png")
     feed.images = True
     feed.send(lambda: feed.shown("slice-0")["hollow"] is False)
+    feed.page.close()
 
 
 def test_without_exact_images_the_page_is_sun_s(browser: Browser) -> None:

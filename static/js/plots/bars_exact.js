@@ -3,12 +3,13 @@
 import { C, size } from "../theme.js";
 import { deg, degrees, number, scale } from "../axis.js";
 import { clear, fit, label, legend, segment, swatches } from "../pen.js";
-import { count, jointKind, paintBytes, swatch } from "../layers.js";
-import { barByte, cellLines, counts, fromLeft, layerWord, presentLayers, stopsInBlocked } from "../exact.js";
+import { count, fade, jointKind, paintBytes, swatch } from "../layers.js";
+import { barByte, cellLines, counts, fromLeft, layerWord, presentLayers, stopsInBlocked, toLeft } from "../exact.js";
 import { described, exactImage, imageAge, imageStale, label as nameOf, machine, snapshotAge, state } from "../state.js";
-import { levelMark } from "../glyphs.js";
+import { levelMark, ring } from "../glyphs.js";
 import { cannotStop, told, wayLines, ways, wayTexts } from "../margins.js";
 import { ageText } from "../head.js";
+import { pinnedFrom } from "../ghost.js";
 import { row } from "./bars_sun.js";
 import { tee } from "./stopping.js";
 
@@ -19,11 +20,11 @@ let rows = [];
 const value = (r, shownValue) => (r.role === "swing" ? fromLeft(state.own, shownValue, r.q) : shownValue);
 
 /** The whole height of a bar shows its cell's byte. */
-function cells(g, entry, r, left, right, y, thick, dpr) {
+function cells(g, entry, r, left, right, y, thick, dpr, old) {
   const w = Math.round((right - left) * dpr), h = Math.round(thick * dpr);
   let raster = rasters.get(r.role);
   if (!raster) rasters.set(r.role, (raster = { canvas: document.createElement("canvas"), key: "" }));
-  const key = `${state.own} ${entry.serial} ${entry.header.state_time} ${w} ${h}`;
+  const key = `${state.own} ${entry.serial} ${entry.header.state_time} ${w} ${h} ${old}`;
   if (raster.key !== key) {
     raster.key = key;
     raster.canvas.width = w;
@@ -32,7 +33,9 @@ function cells(g, entry, r, left, right, y, thick, dpr) {
     const bytes = new Uint8Array(w * h);
     for (let k = 0; k < h; k++) bytes.set(line, k * w);
     const pixels = new ImageData(w, h);
-    paintBytes(bytes, w, h, new Uint32Array(pixels.data.buffer), dpr, jointKind);
+    const bits = new Uint32Array(pixels.data.buffer);
+    paintBytes(bytes, w, h, bits, dpr, jointKind);
+    if (old) fade(bits);
     raster.canvas.getContext("2d").putImageData(pixels, 0, 0);
   }
   g.drawImage(raster.canvas, left, y - thick / 2, w / dpr, h / dpr);
@@ -82,7 +85,7 @@ export function paint(g, width, height, dpr) {
     r.q = m.joints[r.role];
     r.sign = r.role === "swing" ? Math.sign(fromLeft(state.own, 1) - fromLeft(state.own, 0)) || 1 : 1;
     r.map = r.reversed ? scale(r.upper, r.lower, left, right) : scale(r.lower, r.upper, left, right);
-    cells(g, entry, r, left, right, y, thick, dpr);
+    cells(g, entry, r, left, right, y, thick, dpr, old);
     g.lineWidth = 1;
     g.strokeStyle = C.edge;
     if (!r.full) g.strokeRect(left + 0.5, y - thick / 2 + 0.5, right - left - 1, thick - 1);
@@ -90,6 +93,8 @@ export function paint(g, width, height, dpr) {
     const x = Math.min(right, Math.max(left, r.map(r.now)));
     segment(g, x, y - thick / 2 - 4, x, y + thick / 2 + 4, "#000000", 6);
     segment(g, x, y - thick / 2 - 3, x, y + thick / 2 + 3, stale ? C.stale : "#FFFFFF", 3, stale ? [3, 2] : null);
+    const pin = pinnedFrom(`bars ${r.role}`);
+    if (pin) ring(g, Math.min(right, Math.max(left, r.map(r.role === "swing" ? toLeft(state.own, pin[r.role]) : pin[r.role]))), y, 5);
     const text = (v) => (r.reversed && v > 0 ? "+" : "") + degrees(v);
     const ends = r.reversed ? [r.upper, r.lower] : [r.lower, r.upper];
     label(g, r.role, 3.7 * t3, y, { align: "right", base: "middle", colour: C.text, name: "t3" });
@@ -149,5 +154,5 @@ export function aim(x, y) {
   const r = nearest(y);
   const at = r.map.inverse(x);
   if (!inside(r, at)) return null;
-  return { machine: state.own, joints: { ...machine(state.own).joints, [r.role]: value(r, at) } };
+  return { machine: state.own, joints: { ...machine(state.own).joints, [r.role]: value(r, at) }, from: `bars ${r.role}` };
 }

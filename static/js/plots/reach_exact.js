@@ -3,10 +3,11 @@
 import { C, size } from "../theme.js";
 import { degrees, metres, number, scale, ticks } from "../axis.js";
 import { clear, fit, label, legend, segment, swatches } from "../pen.js";
-import { star } from "../glyphs.js";
+import { ring, star } from "../glyphs.js";
 import { count, layerBits, paintBytes, paintVeil, reachKind, swatch } from "../layers.js";
 import { cellLines, counts, fromLeft, layerWord, middles, partnersText, presentLayers, reachByte, sample, toLeft } from "../exact.js";
 import { described, exactImage, image, imageAge, imageStale, label as nameOf, machine, state, swingAt } from "../state.js";
+import { pinnedFrom } from "../ghost.js";
 import { picking } from "../tip.js";
 import { shown } from "../view.js";
 import { ageText } from "../head.js";
@@ -85,11 +86,11 @@ function rasterise(entry, sun, dpr) {
   raster.getContext("2d").putImageData(pixels, 0, 0);
 }
 
-/** "tip 0.7 m over the swing joint (now) · not certified" */
-function titles({ height, picked }) {
+/** "tip 0.70 m above the swing joint, now · not certified"; a small panel's header has no room for the machine. */
+function titles({ height, picked }, small) {
   const tip = `tip ${number(height, 2)} m`;
   const how = picked ? "picked" : "now";
-  return [`${nameOf(state.own)} ${tip} above the swing joint, ${how} · not certified`, `${nameOf(state.own)} ${tip} up, ${how} · not certified`, `${tip}, ${how} · not certified`];
+  return [...(small ? [] : [`${tip} above the swing joint, ${how} · not certified`]), `${nameOf(state.own)} ${tip} up, ${how} · not certified`, `${tip}, ${how} · not certified`];
 }
 
 export function paint(g, width, height, dpr) {
@@ -119,10 +120,12 @@ export function paint(g, width, height, dpr) {
     label(g, value > 0 ? `+${value}°` : value < 0 ? `−${-value}°` : "0°", align === "left" ? Math.max(2, x - t) : align === "right" ? Math.min(width - 2, x + t) : x, box.bottom + 3, { align, base: "top" });
   }
   for (const value of ticks(0, top, 6)) label(g, number(value, 0), box.left - 5, Math.round(mapY(value)) + 0.5, { align: "right", base: "middle" });
-  fit(g, titles(header.reach), 6, 2, width - 10, { base: "top", colour: C.text });
+  fit(g, titles(header.reach, width < 300), 6, 2, width - 10, { base: "top", colour: C.text });
 
   const classes = counts(entry.arrays.reach, reachKind, count);
   const x = toLeft(state.own, header.q.swing), d = own?.reach;
+  const pin = pinnedFrom("reach");
+  if (pin && Number.isFinite(d)) ring(g, mapX(toLeft(state.own, pin.swing)), mapY(Math.min(d, top)), 8);
   if (Number.isFinite(d)) star(g, mapX(x), mapY(Math.min(d, top)), stale);
   label(g, "tip distance, m ↑", box.left + 5, box.top + 3, { base: "top", halo: true });
   if (classes.out) label(g, "out of reach", box.right - 5, box.top + 3, { align: "right", base: "top", halo: true });
@@ -178,5 +181,5 @@ export function aim(x, y) {
   const values = under(x, y);
   if (!values) return null;
   const { q } = exactImage().header;
-  return { machine: state.own, joints: { ...q, swing: fromLeft(state.own, values[0], q.swing) } };
+  return { machine: state.own, joints: { ...q, swing: fromLeft(state.own, values[0], q.swing) }, from: "reach" };
 }

@@ -4,12 +4,13 @@ import { C, size } from "../theme.js";
 import { DEGREE_STEPS, deg, degrees, scale, ticks } from "../axis.js";
 import { clear, fit, label, legend, legendWidth, segment } from "../pen.js";
 import { fillMesh } from "../mesh.js";
-import { star } from "../glyphs.js";
+import { ring, star } from "../glyphs.js";
 import { count, jointKind, paintBytes, paintVeil, swatch } from "../layers.js";
 import { cellLines, counts, jointText, jointsText, layerWord, middles, presentLayers, sample, sliceByte } from "../exact.js";
 import { described, exactImage, image, imageAge, imageStale, label as nameOf, state, sunMap } from "../state.js";
 import { shown } from "../view.js";
 import { ageText } from "../head.js";
+import { pinnedFrom } from "../ghost.js";
 import { stopping } from "./stopping.js";
 import { ageNote } from "./notes.js";
 
@@ -93,6 +94,8 @@ export function sliceExact(index) {
     fit(g, [`slice at ${at.join(", ")}`, at.join(", "), at.join(" ")], 6, 2, width - 10, { base: "top", colour: C.text });
     const x = header.q[across], y = header.q[up];
     const stops = stopping(g, box, mapX, mapY, slice, header, (u, v) => sliceByte(entry, index, u, v));
+    const pin = pinnedFrom(`slice ${index}`);
+    if (pin) ring(g, mapX(pin[across]), mapY(pin[up]), roomy ? 8 : 6);
     star(g, mapX(x), mapY(y), stale, roomy ? 11 : 9);
     label(g, `${up} ↑`, box.left + 5, box.top + 3, { base: "top", halo: true });
     label(g, `${across} →`, box.right - 5, box.bottom - 4, { align: "right", base: "bottom", halo: true });
@@ -113,7 +116,7 @@ export function sliceExact(index) {
     return {
       state: {
         subject: title, kind: "slice", shown: shown(), own: state.own, partners: header.partners, star: [round(x), round(y)], hollow: stale, cells: arrays[`slice${index}`]?.data.length ?? 0,
-        counts: classes, patch: slice.patch ? near : null, fixed: Object.fromEntries(Object.entries(fixed).map(([role, q]) => [role, round(q)])), stops, sun: difference ? sunCells : null, eta: header.eta, state_time: header.state_time,
+        counts: classes, patch: slice.patch ? near : null, fixed: Object.fromEntries(Object.entries(fixed).map(([role, q]) => [role, round(q)])), stops, pinned: pin ? [round(pin[across]), round(pin[up])] : null, sun: difference ? sunCells : null, eta: header.eta, state_time: header.state_time,
       },
       age,
       label: `${title} of ${nameOf(state.own)}, exact slice at ${at.join(", ")}; now ${across} ${degrees(x)}, ${up} ${degrees(y)}: ${cellLines(sliceByte(entry, index, x, y), header, jointKind).join(", ")}; ${ageText(age)}`,
@@ -163,7 +166,7 @@ export function sliceExact(index) {
     const { across, up, x: xs, y: ys } = header.slices[index];
     const [x0, x1] = limits(across, xs), [y0, y1] = limits(up, ys);
     if (values[0] < x0 || values[0] > x1 || values[1] < y0 || values[1] > y1) return null;
-    return { machine: state.own, joints: { ...header.q, [across]: values[0], [up]: values[1] } };
+    return { machine: state.own, joints: { ...header.q, [across]: values[0], [up]: values[1] }, from: `slice ${index}` };
   }
 
   return { paint, probe, aim };
