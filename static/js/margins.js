@@ -37,10 +37,10 @@ export function wayTexts(name, way) {
 
 export function wayLines(name, way, word) {
   if (!way || !Number.isFinite(way.free)) return [`${word}: margin unknown`];
-  const what = way.hits ? `${way.own ? `${partName(way.own)} meets ` : ""}${obstacle(name, way.hits)}` : "joint limit";
+  const what = way.hits ? `${way.own ? `${partName(way.own)} meets ` : ""}${obstacle(name, way.hits)}` : "the joint's limit";
   const times = way.hits ? [`${seconds(way.time_full)} at full speed`, ...(Number.isFinite(way.time_now) ? [`${seconds(way.time_now)} as it moves now`] : [])] : [];
   const stop = Number.isFinite(way.stop_full) ? [`full-speed stop needs ${degrees(way.stop_full, 1)}${cannotStop(way) ? ": CANNOT STOP IN TIME" : ""}`] : [];
-  return [`${word}: ${degrees(way.free, 1)} to ${what}${times.length ? ` · ${times.join(", ")}` : ""}`, ...stop.map((text) => `   ${text}`)];
+  return [`${word}: ${degrees(way.free, 1)}, then ${what}${times.length ? ` · ${times.join(", ")}` : ""}`, ...stop.map((text) => `   ${text}`)];
 }
 
 /** What the present motion leads to. */

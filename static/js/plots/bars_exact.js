@@ -8,7 +8,7 @@ import { barByte, cellLines, counts, fromLeft, layerWord, presentLayers, stopsIn
 import { described, exactImage, imageAge, imageStale, label as nameOf, machine, snapshotAge, state } from "../state.js";
 import { levelMark, ring } from "../glyphs.js";
 import { cannotStop, told, wayLines, ways, wayTexts } from "../margins.js";
-import { ageText } from "../head.js";
+import { ageText, staleText } from "../head.js";
 import { pinnedFrom } from "../ghost.js";
 import { row } from "./bars_sun.js";
 import { tee } from "./stopping.js";
@@ -111,11 +111,11 @@ export function paint(g, width, height, dpr) {
   const has = (name) => Object.values(drawn).some((d) => d[name]);
   const layers = presentLayers(Object.fromEntries(jointKind.layers.map(({ name }) => [name, has(name)])));
   legend(g, 8, height - 0.65 * t, width - 12, [
+    ...(old ? [[swatches.area(C.stale, C.stale), `cells ${staleText(imageAge(entry))}`]] : []),
     [swatches.glyph((c, x, y) => segment(c, x, y - 6, x, y + 6, "#FFFFFF", 3)), "now"],
     ...layers.map((layer) => [swatch.layer(g, layer, dpr), layerWord(layer, header)]),
     ...(has("undecided") ? [[swatch.undecided(g, dpr), "undecided"]] : []),
     [swatches.line(C.text, [3, 2], 1.5), "full-speed stop"],
-    ...(old ? [[swatches.glyph(() => {}), `image ${ageText(imageAge(entry))}`]] : []),
   ]);
   const age = Math.max(snapshotAge(), old ? imageAge(entry) : 0);
   const values = Object.fromEntries(rows.map((r) => [r.role, Math.round(deg(r.now) * 100) / 100]));

@@ -133,7 +133,7 @@ export function paint(g, width, height, dpr) {
   label(g, "right →", box.right - 5, box.bottom - 4, { align: "right", base: "bottom", halo: true });
   const waiting = picking(state.own, header.reach);
   if (waiting !== null && !stale) label(g, `computing ${number(waiting, 1)} s`, box.left + wide / 2, box.bottom - 4, { align: "center", base: "bottom", colour: C.text, halo: true });
-  else ageNote(g, box.left + wide / 2, box.bottom - 4, age, stale, { align: "center", name: stale ? "t3" : "tick" });
+  else ageNote(g, box.left + wide / 2, box.bottom - 4, age, stale, { align: "center", name: stale && width >= 300 ? "t3" : "tick" });
 
   const share = (n) => `${number((100 * n) / Math.max(1, compared.cells), n && n < 0.1 * compared.cells ? 1 : 0)} %`;
   const layers = presentLayers(classes, reachKind).map((layer) => [swatch.layer(g, layer, dpr), layerWord(layer, header)]);

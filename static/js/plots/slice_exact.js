@@ -97,7 +97,7 @@ export function sliceExact(index) {
     const pin = pinnedFrom(`slice ${index}`);
     if (pin) ring(g, mapX(pin[across]), mapY(pin[up]), roomy ? 8 : 6);
     star(g, mapX(x), mapY(y), stale, roomy ? 11 : 9);
-    label(g, `${up} ↑`, box.left + 5, box.top + 3, { base: "top", halo: true });
+    label(g, width < 165 ? `slice, ${up} ↑` : `${up} ↑`, box.left + 5, box.top + 3, { base: "top", halo: true });
     label(g, `${across} →`, box.right - 5, box.bottom - 4, { align: "right", base: "bottom", halo: true });
 
     const classes = counts(arrays[`slice${index}`], jointKind, count);
@@ -110,8 +110,9 @@ export function sliceExact(index) {
     ] : [
       ...present.map((layer) => [swatch.layer(g, layer, dpr), layerWord(layer, header)]),
     ];
-    if (!difference && has("undecided")) entries.push(["undecided", "undec."].map((word) => [swatch.undecided(g, dpr), word]).find((entry, i) => i || legendWidth(g, [...entries, entry], 6) <= width - 8));
-    legend(g, 6, height - 0.65 * t, width - 8, entries, roomy ? 6 : 5);
+    const gap = roomy ? 7 : 5;
+    const undecided = ["undecided", "undec.", "?"].map((word) => [swatch.undecided(g, dpr), word]).find((entry) => legendWidth(g, [...entries, entry], gap) <= width - 8);
+    legend(g, 6, height - 0.65 * t, width - 8, !difference && has("undecided") && undecided ? [...entries, undecided] : entries, gap);
     ageNote(g, box.left + 5, box.bottom - 4, age, stale);
     return {
       state: {
