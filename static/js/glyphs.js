@@ -29,6 +29,17 @@ export function star(g, x, y, hollow, r = 11) {
   }
 }
 
+/** Where a configuration is pinned. */
+export function ring(g, x, y, r) {
+  for (const [width, style] of [[5, "#000000"], [2, "#FFFFFF"]]) {
+    g.lineWidth = width;
+    g.strokeStyle = style;
+    g.beginPath();
+    g.arc(x, y, r, 0, 2 * Math.PI);
+    g.stroke();
+  }
+}
+
 /** The base point, as a cross. */
 export function cross(g, x, y, colour, r = 7) {
   for (const [width, style] of [[6, C.halo], [3, colour]]) {
