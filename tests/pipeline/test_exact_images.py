@@ -20,7 +20,7 @@ from backend.pipeline.regions import regions_image
 from backend.pipeline.surroundings import surroundings_of
 from backend.pipeline.whatif import what_if
 from backend.pipeline.zones import zone_image
-from backend.shell.app.image_frames import exact_frame, regions_frame, rings, zone_frame
+from backend.shell.app.image_frames import exact_frame, frame_of, rings, zone_frame
 from backend.shell.app.wire import decode
 from backend.site.bodies import SiteBodies
 from backend.spatial import transform
@@ -193,8 +193,9 @@ def test_frames_carry_what_the_images_hold(snapshot: Snapshot, walled: Config) -
     assert set(header["variants"]) == {"as_is", "any_swing", "any_posture", "turning"}
     assert arrays["as_is_rings"][:, 0].sum() == len(arrays["as_is"])
     regions = regions_image(snapshot, walled, "a", (8, 6, 6, 6))
-    header, _ = decode(regions_frame(regions))
-    assert header["share"] == regions.share
+    header, _ = decode(exact_frame(image, regions))
+    assert header["regions"]["share"] == regions.share
+    assert frame_of("regions", regions, {}) is None
 
 
 def test_rings_tell_holes_from_exteriors() -> None:

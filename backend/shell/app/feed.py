@@ -15,7 +15,7 @@ from typing import Any
 from fastapi import WebSocket, WebSocketDisconnect
 
 from backend.pipeline.records import Snapshot
-from backend.shell.app.image_frames import FRAMES
+from backend.shell.app.image_frames import frame_of
 from backend.shell.app.wire import encode
 from backend.shell.hub import Hub
 
@@ -45,10 +45,14 @@ class Frames:
 
     def images(self) -> dict[tuple[str, str], tuple[float, bytes]]:
         """(state_time, frame) of every image, by kind and key."""
-        for key, image in self.hub.images().items():
+        images = self.hub.images()
+        for key, image in images.items():
             known = self._images.get(key)
-            if known is None or known[0] != image.state_time:
-                self._images[key] = (image.state_time, FRAMES[key[0]](image))
+            if known is not None and known[0] == image.state_time:
+                continue
+            frame = frame_of(key[0], image, images)
+            if frame is not None:
+                self._images[key] = (image.state_time, frame)
         return dict(self._images)
 
 

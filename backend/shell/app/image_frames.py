@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -42,8 +42,8 @@ def sun_frame(image: PairImage) -> bytes:
     return encode(header, frame_arrays(image))
 
 
-def exact_frame(image: OwnImage) -> bytes:
-    """Arrays slice0.., patch0.., bar0.. and reach: uint8 cells; see backend.cspace.cells."""
+def exact_frame(image: OwnImage, regions: RegionsImage | None = None) -> bytes:
+    """regions: the machine's newest. Arrays slice0.., patch0.., bar0.. and reach: uint8 cells; see backend.cspace.cells."""
     arrays: dict[str, AnyArray] = {}
     for k, part in enumerate(image.slices):
         arrays[f"slice{k}"] = part.cells
@@ -88,6 +88,7 @@ def exact_frame(image: OwnImage) -> bytes:
             role: {"now": float(image.stopping[k, 0]), "full": float(image.stopping[k, 1])}
             for k, role in enumerate(ARM)
         },
+        "regions": None if regions is None else vars(regions),
     }
     return encode(header, arrays)
 
@@ -144,17 +145,13 @@ def rings(zone: BaseGeometry) -> tuple[AnyArray, AnyArray]:
     return xy.astype(np.float32), np.array(sizes, dtype=np.int32).reshape(-1, 2)
 
 
-def regions_frame(image: RegionsImage) -> bytes:
-    return encode({"type": REGIONS, "key": image.key, **vars(image)})
-
-
-FRAMES: dict[str, Callable[[Any], bytes]] = {
-    SUN: sun_frame,
-    EXACT: exact_frame,
-    ZONE: zone_frame,
-    REGIONS: regions_frame,
-}
-"""How each kind of image is encoded."""
+def frame_of(kind: str, image: Any, images: Mapping[tuple[str, str], Any]) -> bytes | None:
+    """The frame of one image. images: the newest of all kinds; None for what pages are not sent."""
+    if kind == SUN:
+        return sun_frame(image)
+    if kind == EXACT:
+        return exact_frame(image, images.get((REGIONS, image.key)))
+    return zone_frame(image) if kind == ZONE else None
 
 
 def _rectangle(part: Slice) -> dict[str, Any]:
