@@ -43,7 +43,10 @@ def sun_frame(image: PairImage) -> bytes:
 
 
 def exact_frame(image: OwnImage, regions: RegionsImage | None = None) -> bytes:
-    """regions: the machine's newest. Arrays slice0.., patch0.., bar0.. and reach: uint8 cells; see backend.cspace.cells."""
+    """regions: the machine's newest.
+
+    Arrays slice0.., patch0.., bar0.. and reach: uint8 cells; see backend.cspace.cells.
+    """
     arrays: dict[str, AnyArray] = {}
     for k, part in enumerate(image.slices):
         arrays[f"slice{k}"] = part.cells
