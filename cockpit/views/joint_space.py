@@ -49,7 +49,7 @@ class JointSpaceNodes:
                 ("undecided", palette.STALE, 0.18),
             )
         ]  # fmt: skip
-        self._box = _lines(scene, "box", SIZE * _EDGES, palette.GRID_MAJOR, 1.5)
+        self._box = _lines(scene, "box", SIZE * _EDGES, palette.SECONDARY, 1.5)
         self._walls = _lines(scene, "walls", np.zeros((3, 2, 3), np.float32), palette.TEXT, 1.0)
         self._stops = [
             _lines(scene, name, np.zeros((3, 2, 3), np.float32), color, pixels)
@@ -146,7 +146,7 @@ def _axis_labels(scene: viser.SceneApi) -> list[tuple[viser.LabelHandle, ...]]:
     labels = []
     for k in range(3):
         row = []
-        for share in (0.0, 0.5, 1.0):
+        for share in (0.08, 0.5, 0.96):
             at = np.full(3, -0.25)
             at[k] = share * SIZE
             row.append(
