@@ -14,9 +14,8 @@ from typing import Any
 
 from fastapi import WebSocket, WebSocketDisconnect
 
-from backend.documents.sun import sun_state_document
-from backend.pipeline.images import PairImage, frame_arrays
 from backend.pipeline.records import Snapshot
+from backend.shell.app.image_frames import FRAMES
 from backend.shell.app.wire import encode
 from backend.shell.hub import Hub
 
@@ -49,25 +48,8 @@ class Frames:
         for key, image in self.hub.images().items():
             known = self._images.get(key)
             if known is None or known[0] != image.state_time:
-                self._images[key] = (image.state_time, _image_frame(image))
+                self._images[key] = (image.state_time, FRAMES[key[0]](image))
         return dict(self._images)
-
-
-def _image_frame(image: PairImage) -> bytes:
-    sun = image.sun
-    header = {
-        "type": "sun",
-        "key": image.key,
-        "own": image.own,
-        "partner": image.partner,
-        "state_time": image.state_time,
-        "eta": sun.eta,
-        "m": sun.m,
-        "n": sun.n,
-        "max_reach": sun.b_max_reach,
-        "current": sun_state_document(sun.current),
-    }
-    return encode(header, frame_arrays(image))
 
 
 class Flow:
