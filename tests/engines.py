@@ -50,10 +50,10 @@ class Coal:
                 manager.registerObject(thing)
             manager.setup()
 
-    def place(self, own: Placed, c: int) -> None:
-        for k, thing in enumerate(self._own):
-            thing.setTransform(coal.Transform3s(own.rotations[c, k], own.centers[c, k]))
-            thing.computeAABB()
+    def place(self, own: Placed, c: int, bodies: Iterable[int] | None = None) -> None:
+        for k in range(len(self._own)) if bodies is None else bodies:
+            self._own[k].setTransform(coal.Transform3s(own.rotations[c, k], own.centers[c, k]))
+            self._own[k].computeAABB()
 
     def against(self, own: Placed, c: int) -> bool:
         self.place(own, c)

@@ -101,10 +101,12 @@ def _clear(machine: Machine, boxes: Boxes) -> Boxes:
 
 
 def free_configurations(scene: Scene, count: int, seed: int, eta: float = 0.0) -> np.ndarray:
-    """(count or fewer, joints) that touch nothing, bodies grown by `eta` [m]."""
-    machine = replace(scene.machine, bodies=scene.machine.bodies.inflated(eta))
+    """(count or fewer, joints) that touch nothing, grown by `eta` against obstacles [m]."""
+    machine = scene.machine
+    grown = replace(machine, bodies=machine.bodies.inflated(eta), self_pairs=())
     q = configurations(np.random.default_rng(seed), machine, 100 * count)
-    return q[~touching(machine, q, scene.obstacles).any(axis=1)][:count]
+    q = q[~touching(machine, q, scene.obstacles).any(axis=1)]
+    return q[~touching(grown, q, scene.obstacles).any(axis=1)][:count]
 
 
 def campaign_models(shared_data: Path) -> list[Machine]:
