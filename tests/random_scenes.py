@@ -69,8 +69,11 @@ def site_boxes(rng: np.random.Generator, reach: float, count: int) -> Boxes:
     return Boxes(np.stack(centers, axis=1), (turns * tilts).as_matrix(), half)
 
 
-def random_scene(seed: int, models: Sequence[Machine]) -> Scene:
-    """Machine `seed` of the models, its partner 2 to 6 m away; nothing meets its tracks."""
+def random_scene(seed: int, models: Sequence[Machine], clear: float = 0.0) -> Scene:
+    """Machine `seed` of the models, its partner 2 to 6 m away.
+
+    Nothing is within `clear` [m] of the own tracks.
+    """
     rng = np.random.default_rng(seed)
     machine, partner = models[seed % len(models)], models[rng.integers(len(models))]
     bearing, gap = rng.uniform(-np.pi, np.pi), rng.uniform(2.0, 6.0)
@@ -84,11 +87,11 @@ def random_scene(seed: int, models: Sequence[Machine]) -> Scene:
     around = site_boxes(rng, machine.max_reach, int(rng.integers(4, 13)))
     T = np.linalg.inv(own)
     layers = {"partner": partner_boxes.moved(T), "site": around.moved(T)}
-    return Scene(machine, partner, gap, {k: _clear(machine, v) for k, v in layers.items()})
+    return Scene(machine, partner, gap, {k: _away(machine, v, clear) for k, v in layers.items()})
 
 
-def _clear(machine: Machine, boxes: Boxes) -> Boxes:
-    """The boxes that do not meet the tracks: those would block the whole image."""
+def _away(machine: Machine, boxes: Boxes, clear: float) -> Boxes:
+    """The boxes more than `clear` [m] from the tracks: others would block the whole image."""
     own = placed(machine, np.zeros((1, len(machine.joints))))
     apart = np.ones(len(boxes), dtype=bool)
     for b in range(len(machine.bodies)):
@@ -96,7 +99,7 @@ def _clear(machine: Machine, boxes: Boxes) -> Boxes:
             one = own.centers[:, b], own.rotations[:, b], own.halves[b : b + 1]
             a = (np.repeat(v, len(boxes), axis=0) for v in one)
             gaps = box_gaps(*a, boxes.centers, boxes.rotations, boxes.half_extents)
-            apart &= gaps > 0.0
+            apart &= gaps > clear
     return boxes.take(apart)
 
 

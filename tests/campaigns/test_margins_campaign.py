@@ -22,7 +22,7 @@ def test_margins(shared_data: Path) -> None:
     begun, found = time.monotonic(), Counter[str]()
     print("\n  scene              boxes     eta  states  to a contact  to itself  wrong")
     for seed in range(200, 200 + SCENES):
-        scene = random_scene(seed, models)
+        scene = random_scene(seed, models, clear=0.10)
         for eta in (0.0, float(np.random.default_rng(seed).uniform(0.02, 0.10))):
             one = swept_margins(scene, STATES, eta, seed)
             found += one
