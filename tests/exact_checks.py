@@ -212,7 +212,7 @@ def exact_cells(scene: Scene, shape: Shape, samples: int, seed: int) -> ExactFou
     return ExactFound(len(q), int(ours.any(axis=1).sum()), len(beyond), found)
 
 
-FINE, COARSE = 2e-4, 2e-3
+FINE, COARSE = 2e-4, 4e-3
 """Steps of the sweep close to the end of a margin and elsewhere [rad]."""
 CLOSE = 0.010
 

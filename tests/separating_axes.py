@@ -88,8 +88,8 @@ def _beyond(c: np.ndarray, box: tuple[np.ndarray, np.ndarray, np.ndarray]) -> np
 def near_pairs(
     own: Placed, obstacles: Boxes, slack: float = 0.0
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(configuration, body, obstacle) where the body's bounding sphere is within `slack` [m] of the
-    obstacle.
+    """(configuration, body, obstacle) where each one's bounding sphere is within `slack` [m] of the
+    other.
     """
     size = np.linalg.norm(own.halves, axis=1) + slack
     other = np.linalg.norm(obstacles.half_extents, axis=1)
@@ -101,6 +101,9 @@ def near_pairs(
     c, i, j = np.nonzero(square.reshape(*own.centers.shape[:2], -1) <= reach**2)
     there = obstacles.centers[j], obstacles.rotations[j], obstacles.half_extents[j]
     near = _beyond(own.centers[c, i], there) <= size[i]
+    c, i, j = c[near], i[near], j[near]
+    here = own.centers[c, i], own.rotations[c, i], own.halves[i]
+    near = _beyond(obstacles.centers[j], here) <= other[j] + slack
     return c[near], i[near], j[near]
 
 
@@ -116,21 +119,20 @@ def near_self_pairs(
     i, j = pairs[p, 0], pairs[p, 1]
     there = own.centers[c, j], own.rotations[c, j], own.halves[j]
     near = _beyond(own.centers[c, i], there) <= size[i] + slack
+    c, i, j = c[near], i[near], j[near]
+    here = own.centers[c, i], own.rotations[c, i], own.halves[i]
+    near = _beyond(own.centers[c, j], here) <= size[j] + slack
     return c[near], i[near], j[near]
 
 
 def _touching(
     a: tuple[np.ndarray, np.ndarray, np.ndarray], b: tuple[np.ndarray, np.ndarray, np.ndarray]
 ) -> np.ndarray:
-    """(k,) whether boxes a[k] and b[k] touch, by cheaper tests first."""
+    """(k,) whether boxes a[k] and b[k] touch, by the faces' axes first."""
     out = np.zeros(len(a[0]), dtype=bool)
-    left = np.arange(len(a[0]))
-    keep = np.flatnonzero(_beyond(b[0], a) <= np.linalg.norm(b[2], axis=1))
-    for all_axes in (False, True):
-        left = left[keep]
-        a, b = tuple(v[keep] for v in a), tuple(v[keep] for v in b)  # type: ignore[assignment]
-        keep = np.flatnonzero(box_gaps(*a, *b, all_axes=all_axes) <= 0.0)
-    out[left[keep]] = True
+    near = np.flatnonzero(box_gaps(*a, *b, all_axes=False) <= 0.0)
+    a, b = tuple(v[near] for v in a), tuple(v[near] for v in b)  # type: ignore[assignment]
+    out[near[box_gaps(*a, *b) <= 0.0]] = True
     return out
 
 
