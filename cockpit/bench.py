@@ -25,7 +25,7 @@ from backend.pipeline.step import initial, step
 from backend.site.site import Site, load_site
 from backend.spatial import rotation, transform
 from cockpit.bench_input import cycles
-from cockpit.bench_live import live_rows
+from cockpit.bench_live import crowded_rows, live_rows
 from cockpit.bench_rows import percentile_rows
 from cockpit.station import load_models, make_config
 
@@ -42,6 +42,7 @@ def run_bench(as_json: bool, seconds: float) -> None:
         ("fast loop and images", lambda: pipeline_rows(site, config)),
         ("distances", lambda: distance_rows(next(iter(models.values())))),
         ("live, over Zenoh", lambda: live_rows(seconds)),
+        ("live, on a crowded site", lambda: crowded_rows(seconds)),
     ]
     with Progress(console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("bench", total=len(parts))

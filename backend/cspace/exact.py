@@ -141,11 +141,18 @@ def arm_model(machine: Machine, rest: Array | None = None, inflation: float = 0.
     )
 
 
-def blocked(model: ArmModel, grid: JointGrid, obstacles: Boxes, kind: int = EXACT) -> AnyArray:
+def blocked(
+    model: ArmModel,
+    grid: JointGrid,
+    obstacles: Boxes,
+    kind: int = EXACT,
+    standing: bool = False,
+) -> AnyArray:
     """Which cells touch obstacles (in the root frame): uint64 (swing, boom, stick, words).
 
     kind: EXACT at the cells' centres; OUTER everything that is not certified free; INNER what is
-    certified to be blocked. The whole machine counts: where the tracks touch, all is blocked.
+    certified to be blocked. The whole machine counts: where the tracks touch, all is blocked,
+    unless they are `standing` on the obstacles.
     """
     pairs = np.ones((len(model.boxes), len(obstacles)), dtype=bool)
     base = np.zeros(grid.shape[0], dtype=bool)
@@ -160,7 +167,7 @@ def blocked(model: ArmModel, grid: JointGrid, obstacles: Boxes, kind: int = EXAC
             _moved(T, model.boxes.take(model.upper)), placed, pairs[model.upper],
             model.arm.swing_sign * grid.centers(0), float(grid.steps[0]) / 2.0, kind,
         )  # fmt: skip
-        base = still | turning
+        base = turning if standing else still | turning
     return _image(model, grid, obstacles, pairs[model.arm.bodies], base, kind)
 
 

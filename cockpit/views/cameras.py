@@ -1,4 +1,4 @@
-"""Where the cameras stand: "site", "plan", "follow" and "behind <machine>"."""
+"""Where the cameras stand: "site", "plan", "follow", "behind <machine>", and "joints"."""
 
 from __future__ import annotations
 
@@ -9,11 +9,13 @@ import numpy as np
 from backend.pipeline.records import Body3D, Snapshot
 from backend.spatial.types import Array
 from cockpit.views.inputs import SceneSite
+from cockpit.views.joint_space import ORIGIN, SIZE
 
 FOV = np.deg2rad(45.0)  # vertical
 PLAN_FOV = np.deg2rad(24.0)
 ELEVATION = np.deg2rad(32.0)  # of the site camera
 ASPECT = 1.65  # width to height that the cameras are laid out for
+JOINTS = "joints"
 REACH_UNPLACED = 8.0  # [m] drawn around the origin before any machine is placed
 
 
@@ -28,7 +30,8 @@ class CameraPose:
 
 def camera_names(site: SceneSite) -> tuple[str, ...]:
     """Every name that `camera_pose` knows."""
-    return ("site", "plan", "follow", *(f"behind {name}" for name in site.machines))
+    behind = (f"behind {name}" for name in site.machines)
+    return ("site", "plan", "follow", *behind, JOINTS)
 
 
 def camera_pose(
@@ -37,10 +40,14 @@ def camera_pose(
     """The camera called `name`, for the machines where they are now.
 
     "behind left" takes a machine's name or label, in any case; "follow" is behind `own` and is
-    asked for again in each cycle. aspect: width to height of the picture.
-    Raises ValueError naming the cameras there are.
+    asked for again in each cycle; "joints" looks at the joint space of `own`.
+    aspect: width to height of the picture. Raises ValueError naming the cameras there are.
     """
     placed = _placed(snapshot)
+    if name == JOINTS:
+        middle = np.array(ORIGIN) + SIZE * np.array([0.5, 0.5, 0.52])
+        away = SIZE * np.array([1.35, -1.75, 0.95]) * max(1.0, ASPECT / max(aspect, 0.5))
+        return CameraPose(middle + away, middle, float(FOV))
     if name == "follow":
         return _behind(site, own, placed)
     if name.startswith("behind"):

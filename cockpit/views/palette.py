@@ -24,6 +24,7 @@ REACH_NOW = rgb("#BCCBD7")
 REACH_MAX = rgb("#94A6B4")
 PARTNER = rgb("#A970F0")
 SITE = rgb("#3E8E78")
+SELF = rgb("#C0B8D9")
 STALE = rgb("#8A949E")
 EDGE = rgb("#0B0F13")
 PAINT = rgb("#D8D8D8")  # of machines described without colours; tinted when drawn

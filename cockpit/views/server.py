@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -14,11 +14,13 @@ import viser
 from viser import _messages
 
 from backend.pipeline.records import Snapshot
+from backend.spatial.types import Array
 from cockpit.views import palette
+from cockpit.views.browser import Browser, browser_of
 from cockpit.views.cameras import ASPECT, CameraPose, camera_pose
 from cockpit.views.inputs import SceneSite, SnapshotSource
 from cockpit.views.scene import Scene
-from cockpit.views.zone import OwnNodes
+from cockpit.views.zone import KINDS
 
 HEAD = (Path(__file__).parent / "client_head.html").read_text(encoding="utf-8")
 """Put in the head of viser's client page by whoever serves it to browsers."""
@@ -86,7 +88,7 @@ class View:
         self._lock = threading.RLock()
         self._own = own
         self._camera = "site"
-        self._browsers: dict[int, OwnNodes] = {}
+        self._browsers: dict[int, Browser] = {}
         self._following: dict[int, CameraPose] = {}
         self._ports: dict[str, int] = {}
         self._stopped = threading.Event()
@@ -126,10 +128,13 @@ class View:
                 self._own = name
             for client_id, client in clients.items():
                 old = self._browsers.get(client_id)
-                if old is not None and old.own != name:
+                if old is not None and old.own.own == name:
+                    continue
+                if old is not None:
                     old.remove()
-                if old is None or old.own != name:
-                    self._browsers[client_id] = self._own_nodes(client, name)
+                self._browsers[client_id] = browser_of(
+                    client.scene, self._site, name, old, self._camera
+                )
         snapshot = self._source.latest()
         if snapshot is not None:
             self._draw_own(snapshot)
@@ -143,13 +148,62 @@ class View:
             if page is None:
                 self._camera = name
             for client_id, client in clients.items():
-                nodes = self._browsers.get(client_id)
-                own = nodes.own if nodes is not None else self._own
+                browser = self._browsers.get(client_id)
+                own = browser.own.own if browser is not None else self._own
+                if browser is not None:
+                    browser.looks = name
                 pose = camera_pose(name, self._site, snapshot, own, client.camera.aspect)
                 self._following.pop(client_id, None)
                 if name == "follow":
                     self._following[client_id] = pose
                 _aim(client, pose)
+
+    def set_zone_kind(self, kind: str, page: str | None = None) -> None:
+        """Which zones a page sees, or all: "exact" or "sun". Raises ValueError for another."""
+        if kind not in KINDS:
+            raise ValueError(f'no zones "{kind}"; there are {", ".join(KINDS)}')
+        with self._lock:
+            for client_id in self._clients(page):
+                if client_id in self._browsers:
+                    self._browsers[client_id].own.kind = kind
+
+    def set_ghost(
+        self, machine: str | None, joints: Mapping[str, float] | None, page: str | None = None
+    ) -> None:
+        """Show a machine in another posture in a page, or in all; without a machine, no ghost.
+
+        joints: values by role [rad], the present ones where not named. Raises ValueError for a
+        machine or joint that does not exist and for what is not a number.
+        """
+        posture = None if machine is None else self._posture(machine, joints or {})
+        snapshot = self._source.latest()
+        with self._lock:
+            for client_id, client in self._clients(page).items():
+                browser = self._browsers.get(client_id)
+                if browser is None:
+                    continue
+                with client.atomic():
+                    browser.show_ghost(client.scene, self._site, machine, posture)
+                    if snapshot is not None:
+                        browser.update_ghost(snapshot)
+
+    def _posture(self, machine: str, joints: Mapping[str, float]) -> Array:
+        """(n,) joint values of a ghost."""
+        if machine not in self._site.machines:
+            known = ", ".join(self._site.machines)
+            raise ValueError(f'no machine "{machine}"; there are {known}')
+        roles = [joint.role for joint in self._site.machines[machine].model.joints]
+        snapshot = self._source.latest()
+        q = np.zeros(len(roles))
+        if snapshot is not None and machine in snapshot.machines:
+            q = np.nan_to_num(snapshot.machines[machine].pose.joints)
+        for role, value in joints.items():
+            if role not in roles:
+                raise ValueError(f'no joint "{role}"; there are {", ".join(roles)}')
+            if not isinstance(value, int | float) or not abs(value) < 100.0:
+                raise ValueError(f"joint {role} is {value!r}; allowed is an angle in radians")
+            q[roles.index(role)] = value
+        return q
 
     def stop(self) -> None:
         """Close the scene and free its port."""
@@ -197,10 +251,11 @@ class View:
     def _draw_own(self, snapshot: Snapshot, lost: float = 0.0) -> None:
         with self._lock:
             clients = self._server.get_clients()
-            for client_id, nodes in self._browsers.items():
-                if client_id in clients:
-                    with clients[client_id].atomic():
-                        nodes.update(snapshot, self._source, self._scene.ground, lost)
+            for client_id, browser in self._browsers.items():
+                if client_id not in clients:
+                    continue
+                with clients[client_id].atomic():
+                    browser.update(snapshot, self._source, self._scene.ground, lost)
 
     def _follow(self, snapshot: Snapshot, elapsed: float) -> None:
         """Cameras behind the own machine swing with it, a little late, so that they are calm."""
@@ -208,10 +263,10 @@ class View:
             clients = self._server.get_clients()
             share = 1.0 - float(np.exp(-min(elapsed, 1.0) / FOLLOW_TIME))
             for client_id, before in list(self._following.items()):
-                nodes = self._browsers.get(client_id)
-                if client_id not in clients or nodes is None:
+                browser = self._browsers.get(client_id)
+                if client_id not in clients or browser is None:
                     continue
-                goal = camera_pose("follow", self._site, snapshot, nodes.own)
+                goal = camera_pose("follow", self._site, snapshot, browser.own.own)
                 if np.abs(goal.position - before.position).max() < 0.01:
                     continue
                 pose = CameraPose(
@@ -230,7 +285,9 @@ class View:
     def _connected(self, client: viser.ClientHandle) -> None:
         with self._lock:
             if client.client_id not in self._browsers:
-                self._browsers[client.client_id] = self._own_nodes(client, self._own)
+                self._browsers[client.client_id] = browser_of(
+                    client.scene, self._site, self._own, None, self._camera
+                )
         snapshot = self._source.latest()
         if client.camera.aspect < ASPECT:  # the initial camera would cut off both sides
             _aim(
@@ -244,10 +301,6 @@ class View:
         with self._lock:
             self._browsers.pop(client.client_id, None)
             self._following.pop(client.client_id, None)
-
-    def _own_nodes(self, client: viser.ClientHandle, own: str) -> OwnNodes:
-        tracks = self._site.machines[own].model.tracks
-        return OwnNodes(client.scene, own, 0.8 * tracks.length)
 
     def _clients(self, page: str | None) -> dict[int, viser.ClientHandle]:
         """The clients of a page; all without one; none of a page that is not connected."""

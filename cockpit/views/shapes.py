@@ -8,6 +8,7 @@ import numpy as np
 import shapely
 import trimesh
 from numpy.typing import NDArray
+from shapely.geometry.base import BaseGeometry
 
 from backend.machine.model import Machine
 from backend.spatial.boxes import Boxes
@@ -89,20 +90,44 @@ def filled(polygon: Array) -> tuple[Float32, UInt32]:
 
     polygon: (k, 2), not closed; one that crosses itself is repaired first. Nothing for zero area.
     """
-    nothing = np.zeros((0, 3), dtype=np.float32), np.zeros((0, 3), dtype=np.uint32)
     if len(polygon) < 3 or not np.isfinite(polygon).all():
-        return nothing
-    shape = shapely.make_valid(shapely.Polygon(polygon))
+        return filled_area(shapely.Polygon())
+    return filled_area(shapely.make_valid(shapely.Polygon(polygon)))
+
+
+def filled_area(area: BaseGeometry) -> tuple[Float32, UInt32]:
+    """The same of any polygons, with holes."""
     triangles = [
         np.asarray(part.exterior.coords)[:3]
-        for part in shapely.get_parts(shapely.constrained_delaunay_triangles(shape))
+        for part in shapely.get_parts(shapely.constrained_delaunay_triangles(area))
         if part.area > 0.0
     ]
     if not triangles:
-        return nothing
+        return np.zeros((0, 3), dtype=np.float32), np.zeros((0, 3), dtype=np.uint32)
     corners = np.stack(triangles)
     u, v = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     clockwise = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0] < 0.0
     corners[clockwise] = corners[clockwise][:, ::-1]
     flat = np.pad(corners.reshape(-1, 2), ((0, 0), (0, 1)))
     return flat.astype(np.float32), np.arange(len(flat), dtype=np.uint32).reshape(-1, 3)
+
+
+def outline(area: BaseGeometry, dash: float = 0.0) -> Float32:
+    """Line segments (k, 2, 3) along all rings of polygons at z = 0.
+
+    dash: length of dashes and of the gaps between them [m]; 0 for a solid line.
+    """
+    segments = []
+    for ring in shapely.get_parts(shapely.boundary(area)):
+        points = shapely.get_coordinates(ring)
+        if dash > 0.0:
+            count = max(2 * round(ring.length / (2.0 * dash)), 4)
+            along = np.linspace(0.0, 1.0, count + 1)
+            points = shapely.get_coordinates(
+                shapely.line_interpolate_point(ring, along, normalized=True)
+            )
+        lines = np.stack([points[:-1], points[1:]], axis=1)
+        segments.append(lines[::2] if dash > 0.0 else lines)
+    if not segments:
+        return np.zeros((0, 2, 3), dtype=np.float32)
+    return np.pad(np.concatenate(segments), ((0, 0), (0, 0), (0, 1))).astype(np.float32)
