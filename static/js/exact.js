@@ -74,7 +74,7 @@ export const partnersText = ({ partners }) => (partners?.length === 1 ? nameOf(p
 export const layerWord = (layer, header) => (layer.name === "partner" ? partnersText(header) : layer.name);
 
 /** The layers a byte names, on top first. */
-export const layersOf = (byte, kind) => (byte === OUTSIDE ? [] : kind.layers.filter(({ bit }) => kind.hits(byte) & bit));
+const layersOf = (byte, kind) => (byte === OUTSIDE ? [] : kind.layers.filter(({ bit }) => kind.hits(byte) & bit));
 
 export function cellLines(byte, header, kind) {
   if (byte === OUTSIDE) return ["no cell here"];

@@ -66,7 +66,7 @@ export function unpin() {
 const withOwn = (own, { own: body, other }) => `${partName(body)} ↔ ${obstacle(own, other)}`;
 
 /** The verdict in one line. */
-export function verdictText(own, answer) {
+function verdictText(own, answer) {
   if (!answer) return "checking";
   if (answer.verdict === "COLLIDING") {
     const [first, ...more] = answer.hits ?? [];

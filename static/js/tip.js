@@ -26,7 +26,7 @@ function pick(height) {
 }
 
 function step(by) {
-  const from = picked(state.own) ?? exactImage()?.header.reach.height;
+  const from = picked(state.own) ?? exactImage()?.header.reach?.height;
   if (!Number.isFinite(from)) return;
   pick(Math.round(from / STEP) * STEP + by);
 }

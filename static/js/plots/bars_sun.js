@@ -3,7 +3,7 @@
 import { C, hatch, rgba, size } from "../theme.js";
 import { DEGREE_STEPS, deg, degrees, number, scale, ticks } from "../axis.js";
 import { clear, label, legend, message, segment, swatches } from "../pen.js";
-import { described, image, imageStale, label as nameOf, machine, snapshotAge, state, sunMap, swing, swingAt } from "../state.js";
+import { described, image, imageStale, label as nameOf, machine, snapshotAge, state, sunMap, swing, swingAt, swingSign } from "../state.js";
 import { ageText } from "../head.js";
 
 let rows = [];
@@ -13,8 +13,9 @@ export function row(joint) {
   const swings = joint.role === "swing";
   const now = swings ? swing(state.own) : m.joints[joint.role];
   const full = joint.continuous || !Number.isFinite(joint.lower) || !Number.isFinite(joint.upper) || joint.lower === null;
-  const lower = full ? -Math.PI : joint.lower;
-  const upper = full ? Math.PI : joint.upper;
+  const turned = swings && swingSign(state.own) < 0; // limits as the operator counts, left positive
+  const lower = full ? -Math.PI : turned ? -joint.upper : joint.lower;
+  const upper = full ? Math.PI : turned ? -joint.lower : joint.upper;
   // The operator's left is the positive swing: its axis runs from + to -.
   const reversed = swings;
   const { sign, offset } = sunMap(state.own, joint.role);

@@ -16,7 +16,7 @@ const VARIANTS = [
 ];
 
 /** Rings [[[x, y], ..], ..] of a variant, holes among them. */
-export function rings(entry, name) {
+function rings(entry, name) {
   const points = entry?.arrays[name]?.data, list = entry?.arrays[`${name}_rings`]?.data;
   if (!points || !list) return [];
   const found = [];
@@ -93,7 +93,7 @@ export function zoneNote(g, entry, stale) {
 }
 
 /** Even-odd over all rings. */
-export function insideZone(point, entry, name, inside) {
+function insideZone(point, entry, name, inside) {
   return rings(entry, name).filter((ring) => inside(point, ring)).length % 2 === 1;
 }
 

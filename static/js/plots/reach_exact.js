@@ -2,7 +2,7 @@
 
 import { C, size } from "../theme.js";
 import { degrees, metres, number, scale, ticks } from "../axis.js";
-import { clear, fit, label, legend, segment, swatches } from "../pen.js";
+import { clear, fit, label, legend, message, segment, swatches } from "../pen.js";
 import { ring, star } from "../glyphs.js";
 import { count, layerBits, paintBytes, paintVeil, reachKind, swatch } from "../layers.js";
 import { cellLines, counts, fromLeft, layerWord, middles, partnersText, presentLayers, reachByte, sample, toLeft } from "../exact.js";
@@ -97,6 +97,11 @@ export function paint(g, width, height, dpr) {
   clear(g, width, height);
   const entry = exactImage();
   const { header } = entry;
+  if (!header.reach || !entry.arrays.reach) {
+    message(g, width, height, "no exact reach image");
+    box = null;
+    return { state: { kind: "exact", star: null }, age: Infinity, label: "Reach: no exact image" };
+  }
   const own = machine(state.own);
   const age = imageAge(entry), stale = imageStale(entry);
   const t = size("tick");
@@ -155,7 +160,7 @@ export function paint(g, width, height, dpr) {
 }
 
 function under(x, y) {
-  if (!exactImage() || !box || x < box.left || x > box.right || y < box.top || y > box.bottom) return null;
+  if (!exactImage()?.header.reach || !box || x < box.left || x > box.right || y < box.top || y > box.bottom) return null;
   return [mapX.inverse(x), mapY.inverse(y)];
 }
 
