@@ -90,7 +90,9 @@ def _finish(
     full: AnyArray, out: AnyArray,
 ) -> None:
     """Write the rows of a batch to out (m, words)."""  # fmt: skip
-    touched_rows(body, b, polygons, p, level.step, level.cells, level.turn, batch, count)
+    count = touched_rows(
+        body, b, polygons, p, level.step, level.cells, level.turn, batch, count, full
+    )
     for r in range(count):
         row = out[batch.index[r]]
         if batch.doubt[r] < 0.0:

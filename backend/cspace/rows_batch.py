@@ -19,22 +19,23 @@ from backend.cspace.rows import ALL, SLACK, Polygons
 from backend.cspace.rows_angles import ERROR
 from backend.cspace.rows_vector import (
     STEEP,
+    arcs_before_line,
     arcs_between,
-    arcs_beyond_line,
     arcs_of_corner,
     bearings,
-    clear,
+    both,
     crossed,
+    from_limit,
     greatest_below,
-    keep,
     least,
     lower,
+    mark,
     normalise,
     offsets,
     projected,
     squares,
     tangents,
-    under,
+    without,
 )
 from backend.spatial.types import AnyArray, Array, IntArray
 
@@ -78,28 +79,65 @@ def new_batch(words: int, corners: int) -> Batch:
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def touched_rows(
     body: Profiles, b: int, polygons: Polygons, k: int, step: float, cells: int, turn: float,
-    batch: Batch, count: int,
-) -> None:
-    """Set batch.blocked of the first `count` rows to the cells where body b is not apart from
-    polygon k, and batch.doubt to below 0 where that is not sure. Bits beyond `cells` mean nothing.
+    batch: Batch, count: int, full: AnyArray,
+) -> int:
+    """Set batch.blocked to the cells where body b is not apart from polygon k, and batch.doubt to
+    below 0 where that is not sure. Rows with none are dropped from the first `count`; how many are
+    left. full: (words,) the cells that count.
     """  # fmt: skip
-    # Vectors are whole: no row is left to scalar code.
-    n = (count + _LANES - 1) // _LANES * _LANES
-    for values in (batch.x, batch.z, batch.origin, batch.margin):
-        values[count:n] = values[0]
+    close = ERROR / abs(step)
+    n = _fill(batch, count)
     batch.blocked[:, :n] = ALL
     batch.doubt[:n] = math.inf
     batch.work[0, :n] = math.inf
     front = _beyond_polygon(body, b, polygons, k, step, cells, turn, batch, n)
-    _beyond_body(body, b, polygons, k, step, cells, turn, batch, n, front)
+    count = _kept(batch, count, full, close)
+    if count == 0:
+        return 0
+    _beyond_body(body, b, polygons, k, step, cells, turn, batch, _fill(batch, count), front)
     nearest, inside = batch.work[0], body.depth[b] <= 0.0
-    close = ERROR / abs(step)
     for r in range(count):
         within = inside and nearest[r] >= 0.0  # the pivot lies in both
         if within or nearest[r] < -body.reach[b]:
             batch.doubt[r] = math.inf
             batch.blocked[:, r] = ALL if within else np.uint64(0)
         batch.doubt[r] -= close
+    return count
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _kept(batch: Batch, count: int, full: AnyArray, close: float) -> int:
+    """Move the rows in which something may still be blocked to the front; how many."""
+    kept = 0
+    for r in range(count):
+        some = batch.doubt[r] < close
+        for w in range(len(full)):
+            some = some or batch.blocked[w, r] & full[w] != 0
+        if not some:
+            continue
+        batch.x[kept], batch.z[kept], batch.index[kept] = batch.x[r], batch.z[r], batch.index[r]
+        batch.origin[kept], batch.margin[kept] = batch.origin[r], batch.margin[r]
+        batch.doubt[kept], batch.work[0, kept] = batch.doubt[r], batch.work[0, r]
+        for w in range(len(full)):
+            batch.blocked[w, kept] = batch.blocked[w, r]
+        kept += 1
+    return kept
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _fill(batch: Batch, count: int) -> int:
+    """Repeat the first row up to whole vectors, so that none is left to scalar code; how many."""
+    n = (count + _LANES - 1) // _LANES * _LANES
+    for r in range(count, n):
+        batch.x[r], batch.z[r] = batch.x[0], batch.z[0]
+        batch.origin[r], batch.margin[r] = batch.origin[0], batch.margin[0]
+    return n
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _widest(turn: float) -> float:
+    """More than half of the arcs in which a line beyond the pivot is crossed or not."""
+    return 0.5 * math.pi + abs(turn) + 1e-9
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
@@ -115,7 +153,7 @@ def _beyond_polygon(
         batch.work[0, :n], batch.work[1, :n], batch.work[2, :n], batch.work[3, :n]
     )  # fmt: skip
     mask, doubt, margin = batch.mask, batch.doubt[:n], batch.margin[:n]
-    widest = max(margin.max(), 0.0) + SLACK
+    before = max(margin.max(), 0.0) + SLACK
     center[:] = -batch.origin[:n]
     front = 0
     for i in range(polygons.sides[k]):
@@ -125,20 +163,21 @@ def _beyond_polygon(
         )  # fmt: skip
         lower(nearest, c)
         lowest = least(c)
-        if lowest < widest:
+        if lowest < before:
             front |= 1 << i
         if lowest >= depth:
             continue
         highest = greatest_below(c, depth)
-        under(c, depth, mask)
+        from_limit(c, depth, mask)
+        widest = _widest(turn) if highest < 0.0 else math.inf
         for v in range(body.sides[b]):
             radius = body.radius[b, v]
             if highest <= -radius:
                 continue
-            arcs_beyond_line(c, radius, turn, half)
-            away = polygons.bearing[k, i] - body.bearing[b, v]
-            keep(center, away, half, step, cells, mask, doubt)
-        clear(batch.blocked, mask, n)
+            arcs_before_line(c, radius, turn, half)
+            away = polygons.bearing[k, i] - body.bearing[b, v] + math.pi
+            mark(center, away, half, widest, step, cells, mask, doubt)
+        both(batch.blocked, mask, n)
     return front
 
 
@@ -166,7 +205,6 @@ def _beyond_body(
         lower(nearest, batch.corners[2, v, :n])
     farthest = math.sqrt(nearest.max())
     straight = False
-    seen = False
     for j in range(body.sides[b]):
         e[:] = body.offset[b, j] + batch.margin[:n]
         if abs(least(e)) < SLACK:
@@ -174,7 +212,7 @@ def _beyond_body(
         lowest = least(e)
         if lowest >= farthest:
             continue
-        mask[:] = ALL
+        mask[:] = 0
         away = -body.normal[b, j]
         if not straight:
             straight = True
@@ -194,12 +232,14 @@ def _beyond_body(
                     )  # fmt: skip
             arcs_between(low, high, turn, center, half)
             center += middle
-            keep(center, away, half, step, cells, mask, doubt)
+            mark(center, away, half, _widest(turn), step, cells, mask, doubt)
+            without(batch.blocked, mask, n)
         else:
+            widest = _widest(turn) if e.max() <= 0.0 else math.inf
             for v in range(edges):
                 arcs_of_corner(e, batch.corners[2, v, :n], turn, half)
                 px, pz = polygons.x[k, v], polygons.z[k, v]
                 center[:], batch.work[7, :n] = px - x, pz - z
                 bearings(center, batch.work[7, :n], batch.origin[:n], center)
-                keep(center, away, half, step, cells, mask, doubt)
-        clear(batch.blocked, mask, n)
+                mark(center, away + math.pi, half, widest, step, cells, mask, doubt)
+            both(batch.blocked, mask, n)

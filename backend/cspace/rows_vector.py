@@ -57,16 +57,25 @@ def offsets(
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def under(values: Array, limit: float, mask: AnyArray) -> None:
-    """All bits of the rows whose value is under the limit, none of the others."""
+def from_limit(values: Array, limit: float, mask: AnyArray) -> None:
+    """All bits of the rows whose value is at or over the limit, none of the others."""
     for w in range(len(mask)):
         words = mask[w]
         for r in range(len(values)):
-            words[r] = ALL if values[r] < limit else np.uint64(0)
+            words[r] = ALL if values[r] >= limit else np.uint64(0)
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def clear(words: AnyArray, mask: AnyArray, n: int) -> None:
+def both(words: AnyArray, mask: AnyArray, n: int) -> None:
+    """words = words & mask in the first n rows."""
+    for w in range(len(words)):
+        left, right = words[w], mask[w]
+        for r in range(n):
+            left[r] &= right[r]
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def without(words: AnyArray, mask: AnyArray, n: int) -> None:
     """words = words & ~mask in the first n rows."""
     for w in range(len(words)):
         left, right = words[w], mask[w]
@@ -75,15 +84,15 @@ def clear(words: AnyArray, mask: AnyArray, n: int) -> None:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator]
-def arcs_beyond_line(c: Array, radius: float, turn: float, half: Array) -> None:
-    """Half of the arc of directions in which a corner at `radius` lies beyond a line at distance c,
-    shortened by turn; below 0 when there is none.
+def arcs_before_line(c: Array, radius: float, turn: float, half: Array) -> None:
+    """Half of the arc of directions, about the one opposite to the line's normal, in which a corner
+    at `radius` is not beyond a line at distance c; widened by turn, below 0 when there is none.
     """
-    inverse = 1.0 / radius
+    inverse = 1.0 / max(radius, 1e-300)
     for r in range(len(c)):
-        h = arc_cosine(min(max(c[r] * inverse, -1.0), 1.0), False) - turn
-        h = _ALL_AROUND if c[r] <= -radius or h >= math.pi else h
-        half[r] = -1.0 if c[r] >= radius else h
+        h = arc_cosine(min(max(-c[r] * inverse, -1.0), 1.0), False) + turn
+        h = _ALL_AROUND if c[r] >= radius or h >= math.pi else h
+        half[r] = -1.0 if c[r] <= -radius else h
 
 
 @njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator]
@@ -91,9 +100,9 @@ def arcs_of_corner(e: Array, square: Array, turn: float, half: Array) -> None:
     """The same for lines at distance e and a corner at the root of `square`."""
     for r in range(len(e)):
         radius = math.sqrt(square[r])
-        h = arc_cosine(min(max(e[r] / (radius + 1e-300), -1.0), 1.0), False) - turn
-        h = _ALL_AROUND if e[r] <= -radius or h >= math.pi else h
-        half[r] = -1.0 if e[r] >= radius else h
+        h = arc_cosine(min(max(-e[r] / (radius + 1e-300), -1.0), 1.0), False) + turn
+        h = _ALL_AROUND if e[r] >= radius or h >= math.pi else h
+        half[r] = -1.0 if e[r] <= -radius else h
 
 
 @njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator]
@@ -165,16 +174,19 @@ def arcs_between(low: Array, high: Array, turn: float, center: Array, half: Arra
 
 
 @njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator]
-def keep(
-    center: Array, away: float, half: Array, step: float, cells: int, mask: AnyArray, doubt: Array
+def mark(
+    center: Array, away: float, half: Array, widest: float, step: float, cells: int,
+    mask: AnyArray, doubt: Array,
 ) -> None:
-    """Clear the cells of mask that are not within `half` of center + away, on the circle and from
-    the first cell. doubt: least distance so far of an arc's end from a cell, in cells.
-    """
+    """Set the cells of mask that are within `half` of center + away, on the circle and from the
+    first cell. widest: no half is above it; doubt: least distance so far of an arc's end from a
+    cell, in cells.
+    """  # fmt: skip
     inverse = 1.0 / step
     scale = abs(inverse)
     period = 2.0 * math.pi * scale
     turns, middle = 1.0 / period, 0.5 * (cells - 1)
+    again = widest * scale + middle > 0.5 * period - 1.0
     for w in range(len(mask)):
         words = mask[w]
         base = 64.0 * w
@@ -183,12 +195,21 @@ def keep(
             c -= period * _whole((c - middle) * turns)
             h = half[r] * scale
             low, high = c - h, c + h
-            shift = -period if c > middle else period
-            low2, high2 = low + shift, high + shift
-            at, to, at2, to2 = _whole(low), _whole(high), _whole(low2), _whole(high2)
-            near = min(min(abs(low - at), abs(high - to)), min(abs(low2 - at2), abs(high2 - to2)))
-            doubt[r] = min(doubt[r], near)
-            words[r] &= _bits(low, at, high, to, base) | _bits(low2, at2, high2, to2, base)
+            at, to = _whole(low), _whole(high)
+            doubt[r] = min(doubt[r], min(abs(low - at), abs(high - to)))
+            words[r] |= _bits(low, at, high, to, base)
+        if not again:
+            continue
+        # An arc as wide as that may also come in at the row's other end.
+        for r in range(len(center)):
+            c = (center[r] + away) * inverse
+            c -= period * _whole((c - middle) * turns)
+            c += -period if c > middle else period
+            h = half[r] * scale
+            low, high = c - h, c + h
+            at, to = _whole(low), _whole(high)
+            doubt[r] = min(doubt[r], min(abs(low - at), abs(high - to)))
+            words[r] |= _bits(low, at, high, to, base)
 
 
 @njit(cache=True, nogil=True, inline="always")  # type: ignore[untyped-decorator]
