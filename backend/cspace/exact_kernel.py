@@ -87,9 +87,9 @@ def _keep_box(
 def _finish(
     chain: Chain, group: int, b: int, body: Profiles, polygons: Polygons, p: int,
     boxes: tuple[Array, Array, Array], level: Level, kind: int, batch: Batch, count: int,
-    full: AnyArray, out: AnyArray,
+    full: AnyArray, done: BoolArray, out: AnyArray,
 ) -> None:
-    """Write the rows of a batch to out (m, words)."""  # fmt: skip
+    """Write the rows of a batch to out (m, words); those that are full now are done."""  # fmt: skip
     count = touched_rows(
         body, b, polygons, p, level.step, level.cells, level.turn, batch, count, full
     )
@@ -103,8 +103,11 @@ def _finish(
             )  # fmt: skip
         if kind == EXACT and chain.askew[b]:
             _keep_box(chain, group, b, boxes, polygons.obstacle[p], level, batch, r, full, row)
+        every = True
         for w in range(len(row)):
             row[w] |= batch.blocked[w, r] & full[w]
+            every = every and row[w] == full[w]
+        done[batch.index[r]] = every
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
@@ -113,7 +116,9 @@ def _rows(
     boxes: tuple[Array, Array, Array], level: Level, kind: int, done: BoolArray, batch: Batch,
     full: AnyArray, out: AnyArray,
 ) -> None:
-    """Set the bits of out (m, words) that the bodies of the group block, but for rows `done`."""  # fmt: skip
+    """Set the bits of out (m, words) that the bodies of the group block, but for rows `done`; rows
+    that get full are done, too.
+    """  # fmt: skip
     for turn in range(2):
         for b in range(len(body.group)):
             # Boxes that are not prisms are dear: they come last, and only for what is still free.
@@ -144,13 +149,13 @@ def _rows(
                         if count == SIZE:
                             _finish(
                                 chain, group, b, body, polygons, p, boxes, level, kind, batch,
-                                count, full, out,
+                                count, full, done, out,
                             )  # fmt: skip
                             count = 0
                 if count > 0:
                     _finish(
                         chain, group, b, body, polygons, p, boxes, level, kind, batch, count, full,
-                        out,
+                        done, out,
                     )  # fmt: skip
 
 

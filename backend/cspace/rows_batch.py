@@ -18,23 +18,23 @@ from backend.cspace.planar_arm import Profiles
 from backend.cspace.rows import ALL, SLACK, Polygons
 from backend.cspace.rows_angles import ERROR
 from backend.cspace.rows_vector import (
-    STEEP,
+    along,
     arcs_before_line,
     arcs_between,
     arcs_of_corner,
+    aside,
     bearings,
     both,
-    crossed,
     from_limit,
+    greatest,
     greatest_below,
+    higher,
+    inverses,
     least,
     lower,
     mark,
-    normalise,
+    narrow,
     offsets,
-    projected,
-    squares,
-    tangents,
     without,
 )
 from backend.spatial.types import AnyArray, Array, IntArray
@@ -49,8 +49,8 @@ class Batch(NamedTuple):
 
     x, z: (m,) pivots [m]; origin: (m,) angles of the first cells [rad]; margin: (m,) how far the
     pivots can be from there [m]; index: (m,) which rows of the image they are; blocked, mask:
-    (words, m); doubt: (m,) distance of an arc's end from a cell, in cells; work: (8, m); corners:
-    (4, v, m).
+    (words, m); doubt: (m,) distance of an arc's end from a cell, in cells; work: (9, m); corners:
+    (2, v, m) one over their distances, directions.
     """
 
     x: Array
@@ -71,8 +71,8 @@ def new_batch(words: int, corners: int) -> Batch:
     return Batch(
         np.empty(SIZE), np.empty(SIZE), np.empty(SIZE), np.empty(SIZE),
         np.empty(SIZE, np.int64), np.empty((words, SIZE), np.uint64),
-        np.empty((words, SIZE), np.uint64), np.empty(SIZE), np.empty((8, SIZE)),
-        np.empty((4, max(corners, 2), SIZE)),
+        np.empty((words, SIZE), np.uint64), np.empty(SIZE), np.empty((9, SIZE)),
+        np.empty((2, corners, SIZE)),
     )  # fmt: skip
 
 
@@ -192,19 +192,26 @@ def _beyond_body(
     edges = polygons.sides[k]
     x, z, mask, doubt = batch.x[:n], batch.z[:n], batch.mask, batch.doubt[:n]
     e, half, center = batch.work[1, :n], batch.work[2, :n], batch.work[3, :n]
-    ux, uz, middle = batch.work[4, :n], batch.work[5, :n], batch.work[6, :n]
-    nearest = batch.work[7, :n]
-    # Directions are measured from the one to the middle of the polygon, along u.
+    ux, uz, middle, low, high = (
+        batch.work[4, :n], batch.work[5, :n], batch.work[6, :n], batch.work[7, :n],
+        batch.work[8, :n],
+    )  # fmt: skip
     ux[:] = polygons.x[k, :edges].mean() - x
     uz[:] = polygons.z[k, :edges].mean() - z
-    bearings(ux, uz, batch.origin[:n], middle)
-    normalise(ux, uz)
-    nearest[:] = math.inf
+    bearings(ux, uz, 0.0, middle)
+    middle -= batch.origin[:n]
+    low[:] = 0.0
     for v in range(edges):
-        squares(x, z, polygons.x[k, v], polygons.z[k, v], batch.corners[2, v, :n])
-        lower(nearest, batch.corners[2, v, :n])
-    farthest = math.sqrt(nearest.max())
-    straight = False
+        inverse, at = batch.corners[0, v, :n], batch.corners[1, v, :n]
+        px, pz = polygons.x[k, v], polygons.z[k, v]
+        inverses(x, z, px, pz, inverse)
+        higher(low, inverse)
+        # Directions are measured from the one to the middle of the polygon: seen from a pivot
+        # outside of it, none is half a turn away.
+        along(x, z, px, pz, ux, uz, half)
+        aside(x, z, px, pz, ux, uz, center)
+        bearings(half, center, 0.0, at)
+    farthest = 1.0 / least(low)
     for j in range(body.sides[b]):
         e[:] = body.offset[b, j] + batch.margin[:n]
         if abs(least(e)) < SLACK:
@@ -214,32 +221,20 @@ def _beyond_body(
             continue
         mask[:] = 0
         away = -body.normal[b, j]
-        if not straight:
-            straight = True
-            for v in range(edges):
-                px, pz = polygons.x[k, v], polygons.z[k, v]
-                projected(x, z, px, pz, ux, uz, batch.corners[0, v, :n])
-                crossed(x, z, px, pz, ux, uz, batch.corners[1, v, :n])
         if lowest >= 0.0:
-            low, high = batch.corners[3, 0, :n], batch.corners[3, 1, :n]
-            low[:], high[:] = -STEEP, STEEP
+            low[:], high[:] = -math.pi, math.pi
             for v in range(edges):
                 before = v - 1 if v > 0 else edges - 1
                 if ((front >> v) | (front >> before)) & 1:
-                    tangents(
-                        batch.corners[0, v, :n], batch.corners[1, v, :n],
-                        batch.corners[2, v, :n], e, low, high,
-                    )  # fmt: skip
+                    narrow(e, batch.corners[0, v, :n], batch.corners[1, v, :n], low, high)
             arcs_between(low, high, turn, center, half)
             center += middle
             mark(center, away, half, _widest(turn), step, cells, mask, doubt)
             without(batch.blocked, mask, n)
         else:
-            widest = _widest(turn) if e.max() <= 0.0 else math.inf
+            widest = _widest(turn) if greatest(e) <= 0.0 else math.inf
             for v in range(edges):
-                arcs_of_corner(e, batch.corners[2, v, :n], turn, half)
-                px, pz = polygons.x[k, v], polygons.z[k, v]
-                center[:], batch.work[7, :n] = px - x, pz - z
-                bearings(center, batch.work[7, :n], batch.origin[:n], center)
+                arcs_of_corner(e, batch.corners[0, v, :n], turn, half)
+                center[:] = middle + batch.corners[1, v, :n]
                 mark(center, away + math.pi, half, widest, step, cells, mask, doubt)
             both(batch.blocked, mask, n)

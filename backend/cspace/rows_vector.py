@@ -16,22 +16,20 @@ from backend.cspace.rows import ALL
 from backend.cspace.rows_angles import arc_cosine, bearing
 from backend.spatial.types import AnyArray, Array
 
-STEEP = 1e300
-"""The tangent of a quarter turn."""
 _ALL_AROUND = 4.0  # [rad] half of an arc that holds everything
 _DROP = 1.5 * 2.0**52
 
 
-@njit(cache=True, nogil=True, fastmath=True)  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True, fastmath={"nnan", "nsz"})  # type: ignore[untyped-decorator]
 def least(values: Array) -> float:
     """The smallest value."""
-    found = math.inf
+    found = values[0]
     for r in range(len(values)):
         found = min(found, values[r])
     return found
 
 
-@njit(cache=True, nogil=True, fastmath=True)  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True, fastmath={"nnan", "nsz"})  # type: ignore[untyped-decorator]
 def greatest_below(values: Array, limit: float) -> float:
     """The greatest value under the limit, -1e300 when there is none."""
     found = -1e300
@@ -42,9 +40,25 @@ def greatest_below(values: Array, limit: float) -> float:
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def lower(values: Array, others: Array) -> None:
-    """values = min(values, others)."""
+    """values = min(values, others), in place."""
     for r in range(len(values)):
         values[r] = min(values[r], others[r])
+
+
+@njit(cache=True, nogil=True, fastmath={"nnan", "nsz"})  # type: ignore[untyped-decorator]
+def greatest(values: Array) -> float:
+    """The greatest value."""
+    found = values[0]
+    for r in range(len(values)):
+        found = max(found, values[r])
+    return found
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def higher(values: Array, others: Array) -> None:
+    """values = max(values, others), in place."""
+    for r in range(len(values)):
+        values[r] = max(values[r], others[r])
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
@@ -96,81 +110,60 @@ def arcs_before_line(c: Array, radius: float, turn: float, half: Array) -> None:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator]
-def arcs_of_corner(e: Array, square: Array, turn: float, half: Array) -> None:
-    """The same for lines at distance e and a corner at the root of `square`."""
+def arcs_of_corner(e: Array, inverse: Array, turn: float, half: Array) -> None:
+    """The same for lines at distance e and a corner at radius 1 / inverse."""
     for r in range(len(e)):
-        radius = math.sqrt(square[r])
-        h = arc_cosine(min(max(-e[r] / (radius + 1e-300), -1.0), 1.0), False) + turn
-        h = _ALL_AROUND if e[r] >= radius or h >= math.pi else h
-        half[r] = -1.0 if e[r] <= -radius else h
+        ratio = e[r] * inverse[r]
+        h = arc_cosine(min(max(-ratio, -1.0), 1.0), False) + turn
+        h = _ALL_AROUND if ratio >= 1.0 or h >= math.pi else h
+        half[r] = -1.0 if ratio <= -1.0 else h
 
 
 @njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator]
-def bearings(x: Array, z: Array, origin: Array, out: Array) -> None:
-    """Directions of the vectors (x, z), from the origins."""
-    for r in range(len(out)):
-        out[r] = bearing(x[r], z[r], False) - origin[r]
-
-
-@njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator]
-def normalise(x: Array, z: Array) -> None:
-    """Make the vectors (x, z) one long."""
-    for r in range(len(x)):
-        inverse = 1.0 / math.sqrt(x[r] * x[r] + z[r] * z[r] + 1e-300)
-        x[r] *= inverse
-        z[r] *= inverse
+def narrow(e: Array, inverse: Array, at: Array, low: Array, high: Array) -> None:
+    """Raise `low` and lower `high` to the directions of the normals between which a corner in the
+    direction `at`, at radius 1 / inverse, lies beyond an edge at distance e >= 0.
+    """
+    for r in range(len(e)):
+        h = arc_cosine(min(e[r] * inverse[r], 1.0), False)
+        low[r], high[r] = max(low[r], at[r] - h), min(high[r], at[r] + h)
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def squares(x: Array, z: Array, px: float, pz: float, out: Array) -> None:
-    """Squared distances of the point p from the pivots."""
+def arcs_between(low: Array, high: Array, turn: float, center: Array, half: Array) -> None:
+    """Middles and halves, shortened by turn, of arcs between two directions."""
+    for r in range(len(low)):
+        center[r] = 0.5 * (low[r] + high[r])
+        half[r] = 0.5 * (high[r] - low[r]) - turn if low[r] < high[r] else -1.0
+
+
+@njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator]
+def bearings(x: Array, z: Array, origin: float, out: Array) -> None:
+    """Directions of the vectors (x, z), from the direction `origin`."""
+    for r in range(len(out)):
+        out[r] = bearing(x[r], z[r], False) - origin
+
+
+@njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator]
+def inverses(x: Array, z: Array, px: float, pz: float, out: Array) -> None:
+    """One over the distances of the point p from the pivots."""
     for r in range(len(out)):
         dx, dz = px - x[r], pz - z[r]
-        out[r] = dx * dx + dz * dz
+        out[r] = 1.0 / math.sqrt(dx * dx + dz * dz + 1e-300)
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def projected(x: Array, z: Array, px: float, pz: float, ux: Array, uz: Array, out: Array) -> None:
-    """Components of p, as seen from the pivots, along (ux, uz)."""
+def along(x: Array, z: Array, px: float, pz: float, ux: Array, uz: Array, out: Array) -> None:
+    """Components of p, as seen from the pivots, along (ux, uz), times the length of that."""
     for r in range(len(out)):
         out[r] = ux[r] * (px - x[r]) + uz[r] * (pz - z[r])
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def crossed(x: Array, z: Array, px: float, pz: float, ux: Array, uz: Array, out: Array) -> None:
-    """Components of p, as seen from the pivots, to the left of (ux, uz)."""
+def aside(x: Array, z: Array, px: float, pz: float, ux: Array, uz: Array, out: Array) -> None:
+    """The same to the left of (ux, uz)."""
     for r in range(len(out)):
         out[r] = ux[r] * (pz - z[r]) - uz[r] * (px - x[r])
-
-
-@njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator]
-def tangents(
-    along: Array, aside: Array, square: Array, e: Array, low: Array, high: Array
-) -> None:
-    """Raise `low` and lower `high`: tangents, measured from the direction of `along`, of the
-    normals between which a corner (along, aside) lies beyond an edge at distance e >= 0.
-
-    The normal m of the line through the corner u at distance e has m . u = e, so that
-    m |u|^2 = e u -+ sqrt(|u|^2 - e^2) u_left. A normal that is good for all corners is within a
-    quarter turn of each point of the polygon, so that others count as steep.
-    """
-    for r in range(len(e)):
-        t = math.sqrt(max(square[r] - e[r] * e[r], 0.0))
-        ex, ez, tx, tz = e[r] * along[r], e[r] * aside[r], t * along[r], t * aside[r]
-        from_x, to_x = ex + tz, ex - tz
-        left = (ez - tx) / from_x if from_x > 0.0 else (STEEP if aside[r] > 0.0 else -STEEP)
-        right = (ez + tx) / to_x if to_x > 0.0 else (-STEEP if aside[r] < 0.0 else STEEP)
-        low[r] = max(low[r], STEEP if square[r] <= e[r] * e[r] else left)
-        high[r] = min(high[r], right)
-
-
-@njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator]
-def arcs_between(low: Array, high: Array, turn: float, center: Array, half: Array) -> None:
-    """Middles and halves, shortened by turn, of the arcs between two tangents."""
-    for r in range(len(low)):
-        left, right = bearing(1.0, low[r], False), bearing(1.0, high[r], False)
-        center[r] = 0.5 * (left + right)
-        half[r] = 0.5 * (right - left) - turn if low[r] < high[r] else -1.0
 
 
 @njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator]
