@@ -14,10 +14,9 @@ from functools import lru_cache
 import numpy as np
 
 from backend.cspace.exact_kernel import Chain, image_kernel
-from backend.cspace.exact_slices import EXACT, INNER, OUTER, Cells
+from backend.cspace.exact_levels import EXACT, INNER, OUTER, Axis, levels
 from backend.cspace.exact_upper import touching_swings
 from backend.cspace.planar_arm import PlanarArm, Profiles, planar_arm
-from backend.cspace.rows import Row
 from backend.machine.kinematics import body_boxes, link_poses
 from backend.machine.model import PARTS, Machine
 from backend.spatial import transform
@@ -25,10 +24,6 @@ from backend.spatial.boxes import Boxes
 from backend.spatial.types import AnyArray, Array, BoolArray, IntArray, frozen
 
 __all__ = ["EXACT", "INNER", "OUTER", "ArmModel", "JointGrid", "arm_model", "blocked", "joint_grid"]
-
-
-_CHUNKS = 12
-"""Pieces of an image that the threads share: enough to even out dear and cheap swings."""
 
 
 @dataclass(frozen=True)
@@ -119,10 +114,11 @@ def arm_model(machine: Machine, rest: Array | None = None, inflation: float = 0.
     pairs = np.zeros((len(part), len(part)), dtype=bool)
     for a, b in machine.self_pairs:
         pairs[a, b] = pairs[b, a] = True
+    links = np.array([0.0, np.hypot(*arm.boom), np.hypot(*arm.boom) + np.hypot(*arm.stick)])
+    far = [arm.outer.reach[arm.groups == k].max(initial=0.0) for k in range(3)]
     chain = Chain(
-        arm.pivot.copy(),
-        arm.boom.copy(),
-        arm.stick.copy(),
+        arm.pivots,
+        links + far,
         arm.boxes.centers.copy(),
         arm.boxes.rotations.copy(),
         arm.boxes.half_extents.copy(),
@@ -227,32 +223,48 @@ def _image(
     out = np.zeros((*grid.shape[:3], grid.words), dtype=np.uint64)
     if not base.any() and not pairs.any():
         return out
-    T_arm_root = model.arm.T_arm_root(grid.centers(0))[:, :3, :].copy()
-    signs = model.arm.signs
-    rows = [
-        Row(float(signs[k] * grid.centers(k + 1)[0]), float(signs[k] * _step(grid, k + 1)), n)
-        for k, n in enumerate(grid.shape[1:])
-    ]
     halves = np.zeros(4) if kind == EXACT else grid.steps / 2.0
     if kind == OUTER and slack is not None:
         halves = halves + slack
+    boom, stick, bucket = levels(model.arm, _axes(model, grid, halves), kind)
     body: Profiles = model.arm.inner if kind == INNER else model.arm.outer
     arguments = (
         model.chain,
         body,
         (obstacles.centers.copy(), obstacles.rotations.copy(), obstacles.half_extents.copy()),
         np.ascontiguousarray(pairs),
-        T_arm_root,
-        Cells(rows[0], rows[1], rows[2], kind, halves),
+        model.arm.T_arm_root(grid.centers(0))[:, :3, :].copy(),
+        boom,
+        stick,
+        bucket,
+        kind,
+        float(halves[0]),
         base,
     )
-    cuts = np.linspace(0, grid.shape[0], min(grid.shape[0], _CHUNKS) + 1).astype(int)
-    spans = list(zip(cuts[:-1].tolist(), cuts[1:].tolist(), strict=True))
-    if len(spans) < _CHUNKS:
-        image_kernel(*arguments, 0, grid.shape[0], out)
-    else:
-        list(_pool().map(lambda span: image_kernel(*arguments, *span, out), spans))
+    rows = out.reshape(grid.shape[0], -1, grid.words)
+    # Swings side by side cost about the same: each thread takes every so many.
+    every = min(os.cpu_count() or 1, grid.shape[0])
+    others = [
+        _pool().submit(image_kernel, *arguments, first, every, rows) for first in range(1, every)
+    ]
+    image_kernel(*arguments, 0, every, rows)
+    for other in others:
+        other.result()
     return out
+
+
+def _axes(model: ArmModel, grid: JointGrid, halves: Array) -> tuple[Axis, Axis, Axis]:
+    """Cells of boom, stick and bucket as angles in the arm's plane. halves: (4,) [rad]."""
+    boom, stick, bucket = (
+        Axis(
+            float(sign * grid.centers(k)[0]),
+            float(sign * _step(grid, k)),
+            grid.shape[k],
+            float(halves[k]),
+        )
+        for k, sign in enumerate(model.arm.signs, start=1)
+    )
+    return boom, stick, bucket
 
 
 @lru_cache(maxsize=1)
