@@ -78,15 +78,21 @@ def _hits(
 
 
 def touching(
-    machine: Machine, q: Array, obstacles: Boxes, standing: bool = False
+    machine: Machine,
+    q: Array,
+    obstacles: Boxes,
+    standing: bool = False,
+    ask_itself: bool = True,
 ) -> tuple[BoolArray, BoolArray]:
     """(touches an obstacle, touches itself), each (k,), at q (k, n) [rad]; bodies as built.
 
-    obstacles in the machine's root frame; standing: the tracks stand on them, which does not count.
+    obstacles in the machine's root frame; standing: the tracks stand on them, which does not count;
+    ask_itself: False leaves the second answer at False.
     """
     q = np.asarray(q, dtype=float)
     against, itself = np.zeros(len(q), dtype=bool), np.zeros(len(q), dtype=bool)
-    pairs = np.array(machine.self_pairs, dtype=np.int64).reshape(-1, 2)
+    itself_pairs = machine.self_pairs if ask_itself else ()
+    pairs = np.array(itself_pairs, dtype=np.int64).reshape(-1, 2)
     own = (
         machine.bodies.centers.copy(),
         machine.bodies.rotations.copy(),

@@ -107,7 +107,9 @@ def reach_image(
     asked = state == ReachState.FREE
     hit = {name: np.zeros(S.shape, dtype=bool) for name in (*layers, SELF)}
     for name, boxes in (*layers.items(), (SELF, NO_BOXES)):
-        against, itself = touching(machine, configurations[asked], boxes, name == GROUND)
+        against, itself = touching(
+            machine, configurations[asked], boxes, name == GROUND, name == SELF
+        )
         hit[name][asked] = itself if name == SELF else against
     state[np.any(list(hit.values()), axis=0)] = ReachState.COLLIDING
     near = solution.reachable & (slack < NEAR)

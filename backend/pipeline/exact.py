@@ -13,6 +13,7 @@ import numpy as np
 
 from backend.cspace.cells import COLLIDING, FREE, CellModels, cell_models, coded
 from backend.cspace.exact import JointGrid
+from backend.cspace.joint_bars import joint_bar
 from backend.cspace.reach_image import ReachImage, reach_image
 from backend.cspace.regions import cell_of
 from backend.fusion.inflation import joint_slack
@@ -112,7 +113,8 @@ def own_image(
     around = surroundings_of(own, snapshot.machines, config)
     q, layers = state.pose.joints, around.layers
     eta = growth(own, snapshot.machines, config)
-    models = cell_models(machine, q, eta, joint_slack(state.pose))
+    slack = joint_slack(state.pose)
+    models = cell_models(machine, q, eta, slack)
     edges = joint_edges(machine, q)
     volume = _cells(models, layers, edges, q, dict.fromkeys((1, 2, 3), cells.volume))
     return OwnImage(
@@ -123,7 +125,11 @@ def own_image(
         q=q,
         slices=tuple(_slice(models, layers, edges, q, plane, cells.slice) for plane in PLANES),
         bars=tuple(
-            Bar(role, edges[k], _cells(models, layers, edges, q, {k: cells.bar}).ravel())
+            Bar(
+                role,
+                edges[k],
+                joint_bar(machine, q, k, edges[k], cells.bar, layers, models.eta, slack),
+            )
             for k, role in enumerate(ARM)
         ),
         volume=volume[0],
