@@ -14,12 +14,13 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
+from backend.cspace.driving_cover import cover
 from backend.cspace.driving_posture import moved, swept_arm
 from backend.cspace.driving_profile import Revolved, revolve
 from backend.cspace.driving_revolved import revolved_pieces
 from backend.cspace.driving_tilted import tilted_pieces
 from backend.cspace.driving_turning import turning_pieces
-from backend.cspace.minkowski import Pieces, cover, joined_pieces, slice_pieces
+from backend.cspace.minkowski import Pieces, joined_pieces, slice_pieces
 from backend.machine import kinematics
 from backend.machine.model import Machine
 from backend.spatial import transform

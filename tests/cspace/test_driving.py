@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from backend.collision import box_distance
 from backend.cspace import minkowski
 from backend.cspace.driving import DrivingZone, driving_zone, turning_zone, way_out
+from backend.cspace.driving_cover import cover
 from backend.machine import kinematics
 from backend.machine.load import load_machine
 from backend.machine.model import Machine
@@ -254,7 +255,7 @@ def test_slice_of_two_boxes(seed: int, half: tuple[float, ...]) -> None:
     centers = rng.uniform(-0.5, 0.5, (2, 3))
     sizes = np.array(half).reshape(2, 3)
     a, b = (Boxes(centers[k, None], R[k, None], sizes[k, None]) for k in (0, 1))
-    zone = minkowski.cover(minkowski.slice_pieces(a, b))
+    zone = cover(minkowski.slice_pieces(a, b))
     points = rng.uniform(-3.0, 3.0, (60, 2))
     hit = np.array([touches(a, b, p) for p in points])
     if zone.is_empty:
