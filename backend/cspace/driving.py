@@ -30,6 +30,9 @@ from backend.spatial.types import Array, BoolArray
 TOLERANCE = 8e-4
 """How far a drawn zone may exceed the true one [m]."""
 
+SLOPE_TOLERANCE = 1e-2
+"""The same for what swings about an axis that is not upright [m]: cavities are larger than this."""
+
 _LEVEL = 1e-9
 """A swing axis this close to upright counts as upright [rad]."""
 
@@ -86,8 +89,9 @@ def driving_zone(
     own = kinematics.body_boxes(own_machine, kinematics.link_poses(own_machine, own_q, T))
     tracks = np.array([own_machine.part_of_body(b) == "tracks" for b in range(len(own))])
     parked = slice_pieces(bodies, own.take(tracks))
+    upright = np.hypot(*T[:2, 2]) <= _LEVEL
     # Half of the tolerance for the radii of the solid, half for drawing its arcs.
-    part = 0.5 * tolerance
+    part = 0.5 * (tolerance if upright else max(tolerance, SLOPE_TOLERANCE))
     now = cover(slice_pieces(bodies, own))
     swing = cover(
         joined_pieces([parked, _swinging(own_machine, own, own_q, tracks, T, bodies, part)])

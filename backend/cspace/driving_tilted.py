@@ -4,17 +4,21 @@ For a body a and a convex run k the zone is the slice at height 0 of the Minkows
 Its support in a horizontal direction u is min over b of h(u cos b + z sin b) / cos b, h being the
 support of the difference (the dual of maximising u over the slice), and every b gives a line that
 bounds the zone from outside. Lines are added where the polygon still exceeds the chord of two
-points of the zone by more than the tolerance. Cavities around the axis are filled: never unsafe,
-and too large where a body would hang inside one.
+points of the zone by more than the tolerance. Places where the body hangs free inside the solid,
+around its axis, are holes (`driving_cavity`).
 """
 
 from __future__ import annotations
 
 import numpy as np
+import shapely
 from numba import njit
 
+from backend.cspace.driving_cavity import cavities
+from backend.cspace.driving_cover import union
+from backend.cspace.driving_hidden import outermost
 from backend.cspace.driving_profile import Revolved, thickened
-from backend.cspace.minkowski import Pieces, convex_hull, solid_pieces
+from backend.cspace.minkowski import Pieces, convex_hull, polygons, solid_pieces
 from backend.spatial.boxes import Boxes
 from backend.spatial.types import Array, IntArray
 
@@ -29,10 +33,10 @@ def tilted_pieces(solid: Revolved, T_site_axis: Array, bodies: Boxes, tolerance:
     """Shifts (x, y) [m] of the solid for which it touches a body, as pieces of a union.
 
     T_site_axis: (4, 4), the frame of the solid's axis where it stands; bodies: boxes in the site
-    frame, z up.
+    frame, z up. The pieces contain the zone of the solid and exceed it by about `tolerance` [m].
     """
     a = thickened(bodies)
-    points, start = _tilted(
+    points, start, pairs = _tilted(
         *(np.ascontiguousarray(v) for v in (a.centers, a.rotations, a.half_extents)),
         np.ascontiguousarray(T_site_axis[:3, 3]),
         np.ascontiguousarray(T_site_axis[:3, 2]),
@@ -41,7 +45,29 @@ def tilted_pieces(solid: Revolved, T_site_axis: Array, bodies: Boxes, tolerance:
         solid.start,
         tolerance,
     )
-    return solid_pieces(points, start)
+    outlines = solid_pieces(points, start)
+    most = np.maximum.reduceat(solid.inner, solid.start[:-1]) if len(solid) else np.zeros(0)
+    hollow = most[pairs[:, 0]] > tolerance
+    if not hollow.any():
+        return outlines
+    # A free place lies in cavities of outermost outlines and outside of all that have none; only
+    # the cavities of what reaches into such a place matter.
+    outer = np.flatnonzero(outermost(points, start) & hollow)
+    bounds = np.array([points.min(axis=0), points.max(axis=0)])
+    places = union(polygons(*cavities(solid, T_site_axis, a, pairs[outer], bounds, tolerance)[:2]))
+    every = np.array(polygons(points, start), dtype=object)
+    shapely.prepare(places)
+    filled = every[~hollow]
+    places = shapely.difference(places, union(list(filled[shapely.intersects(filled, places)])))
+    if places.is_empty:
+        return outlines
+    shapely.prepare(places)
+    mine = np.flatnonzero(hollow & shapely.intersects(every, places))
+    bounds = np.array(places.bounds).reshape(2, 2)
+    holes, hole_start, owner = cavities(
+        solid, T_site_axis, a, pairs[mine], bounds, tolerance
+    )
+    return Pieces(points, start, holes, hole_start, mine[owner])
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
@@ -192,11 +218,12 @@ def _tilted(
     outer: Array,
     start: IntArray,
     tolerance: float,
-) -> tuple[Array, IntArray]:
+) -> tuple[Array, IntArray, IntArray]:
     points = np.empty((4096, 2))
     ends = np.zeros(len(ca) * (len(start) - 1) + 1, np.int64)
     corners, ring = np.empty((_MOST, 2)), np.empty((_MOST, 2))
     up, down, top_bottom = np.array([0.0, 0.0, 1.0]), np.array([0.0, 0.0, -1.0]), np.empty((2, 3))
+    pair = np.empty((len(ends), 2), np.int64)
     made = 0
     for e in range(len(start) - 1):
         run = slice(start[e], start[e + 1])
@@ -212,5 +239,6 @@ def _tilted(
                 points = np.concatenate((points, np.empty_like(points)))
             points[ends[made] : ends[made] + m] = ring[:m]
             ends[made + 1] = ends[made] + m
+            pair[made] = e, i
             made += 1 if m else 0
-    return points[: ends[made]].copy(), ends[: made + 1].copy()
+    return points[: ends[made]].copy(), ends[: made + 1].copy(), pair[:made].copy()
