@@ -76,16 +76,21 @@ def driving_zone(
     partner_boxes: Boxes,
     eta: float = 0.0,
     tolerance: float = TOLERANCE,
+    view: float = np.inf,
 ) -> DrivingZone:
     """All three variants of the zone that `own_machine` must not drive into.
 
     own_q: (n,) [rad]; T_own_base: (4, 4), the URDF root in any frame with z up; partner_boxes: in
     the same frame; eta: inflation [m], every partner box grown by it on every side (this contains
-    the ball of radius eta). The first call for a machine sweeps its arm and takes about a second.
+    the ball of radius eta); view: the zone is complete within this distance of the base [m], boxes
+    that cannot matter there are left out, and a distance above it means "farther than the view".
+    The first call for a machine sweeps its arm and takes about a second.
     Raises ValueError for a negative or infinite eta and a tolerance that is not positive.
     """
     _check(eta, tolerance)
     T, bodies = _local(T_own_base, partner_boxes, eta)
+    to_swing = float(np.linalg.norm(own_machine.arm.T_root_swing[:3, 3]))
+    bodies = _in_view(bodies, own_machine.bounding_radius + to_swing + view)
     own = kinematics.body_boxes(own_machine, kinematics.link_poses(own_machine, own_q, T))
     tracks = np.array([own_machine.part_of_body(b) == "tracks" for b in range(len(own))])
     parked = slice_pieces(bodies, own.take(tracks))
@@ -185,6 +190,12 @@ def _local(T_own_base: Array, partner_boxes: Boxes, eta: float) -> tuple[Array, 
         partner_boxes.centers - base, partner_boxes.rotations, partner_boxes.half_extents
     )
     return T, bodies.inflated(eta) if eta > 0.0 else bodies
+
+
+def _in_view(bodies: Boxes, radius: float) -> Boxes:
+    """The boxes whose bounding spheres come within `radius` [m] of the vertical at the origin."""
+    apart = np.hypot(bodies.centers[:, 0], bodies.centers[:, 1])
+    return bodies.take(apart - np.linalg.norm(bodies.half_extents, axis=1) <= radius)
 
 
 def _check(eta: float, tolerance: float) -> None:

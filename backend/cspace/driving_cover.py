@@ -31,7 +31,7 @@ def cover(pieces: Pieces) -> BaseGeometry:
     if len(pieces) == 0:
         return shapely.Polygon()
     every = np.array(polygons(pieces.points, pieces.start), dtype=object)
-    outer = np.flatnonzero(outermost(pieces.points, pieces.start))
+    outer: IntArray = np.flatnonzero(outermost(pieces.points, pieces.start)).astype(np.int64)
     outline = _outline(pieces, every, outer)
     if not np.isin(outer, pieces.owner).any():
         return outline
@@ -42,7 +42,7 @@ def cover(pieces: Pieces) -> BaseGeometry:
     return shapely.difference(outline, union(left)) if left else outline
 
 
-def _outline(pieces: Pieces, every: Array, outer: Array) -> BaseGeometry:
+def _outline(pieces: Pieces, every: Array, outer: IntArray) -> BaseGeometry:
     """Union of the filled outlines `outer`, of which only the exposed ones are put together.
 
     The edge of the union consists of exposed edges alone. A hole among the exposed ones therefore

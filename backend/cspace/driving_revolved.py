@@ -40,9 +40,7 @@ def _sides(radius: float, tolerance: float) -> int:
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def cut(
-    corners: Array, edges: IntArray, z: Array, inner: Array, outer: Array, disks: Array
-) -> int:
+def cut(corners: Array, edges: IntArray, z: Array, inner: Array, outer: Array, disks: Array) -> int:
     """Vertices of a box cut at the heights of a run: disks (n, 4) = x, y, outer, inner; n."""
     bottom = max(corners[:, 2].min(), z[0])
     top = min(corners[:, 2].max(), z[-1])

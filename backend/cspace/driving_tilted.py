@@ -64,9 +64,7 @@ def tilted_pieces(solid: Revolved, T_site_axis: Array, bodies: Boxes, tolerance:
     shapely.prepare(places)
     mine = np.flatnonzero(hollow & shapely.intersects(every, places))
     bounds = np.array(places.bounds).reshape(2, 2)
-    holes, hole_start, owner = cavities(
-        solid, T_site_axis, a, pairs[mine], bounds, tolerance
-    )
+    holes, hole_start, owner = cavities(solid, T_site_axis, a, pairs[mine], bounds, tolerance)
     return Pieces(points, start, holes, hole_start, mine[owner])
 
 

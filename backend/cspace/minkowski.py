@@ -50,7 +50,8 @@ class Pieces:
     """Convex polygons, some with holes, stored one after the other; see `box_slices`.
 
     points: (k, 2) [m], start: (p + 1,); holes: (m, 2) [m], hole_start: (h + 1,), owner: (h,) the
-    piece of each hole, ascending; simple polygons. A hole may reach beyond its piece; a piece may have several.
+    piece of each hole, ascending; simple polygons. A hole may reach beyond its piece;
+    a piece may have several.
     """
 
     points: Array

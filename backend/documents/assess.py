@@ -10,6 +10,7 @@ import numpy as np
 from backend.collision.closest import ClosePairs, all_pairs, closest_pairs
 from backend.cspace.sun_images import sun_image
 from backend.cspace.sun_pose import sun_pose
+from backend.documents.driving import driving_document
 from backend.documents.state import (
     MachineStateDocument,
     StateDocument,
@@ -37,7 +38,7 @@ def assess(
     every_pair: bool = False,
     where: str = "state",
 ) -> dict[str, Any]:
-    """Bodies, end-points, closest distances and Sun's sets of one state document.
+    """Bodies, end-points, closest distances, Sun's sets and driving zones of one state document.
 
     machines: the description of every machine of the document. Coordinates of the result are in
     the frame of the document's positions [m]; distances are of bodies as built. Raises InputError.
@@ -61,6 +62,13 @@ def assess(
             pair_key(own, partner): _sun(machines, poses, own, partner, sun, origin)
             for own, partner in permutations(poses, 2)
         },
+        "driving_zone": driving_document(
+            machines,
+            {name: pose.joints for name, pose in poses.items()},
+            {name: base_transform(pose) for name, pose in poses.items()},
+            placed,
+            origin,
+        ),
     }
 
 
