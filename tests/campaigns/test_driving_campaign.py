@@ -1,4 +1,4 @@
-"""Driving zones against separating axes in space, at 100,000 random places per variant and scene."""
+"""Driving zones against separating axes in space: 100,000 random places a variant and scene."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from backend.machine.load import load_machine
 from backend.spatial import rotation, transform
 from backend.spatial.boxes import Boxes
 
-PLACES, POSTURES = 100_000, 500
+PLACES, POSTURES = 100_000, 200
 Q, Q_PARTNER = np.array([-0.3, 0.6, -1.2, 0.2]), np.array([0.3, 0.5, -1.0, 0.2])
 SLOPES = {"level": (0.0, 0.0), "gentle": (0.06, -0.03), "15 deg": (0.22, -0.15)}
 
