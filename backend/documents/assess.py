@@ -10,6 +10,7 @@ import numpy as np
 from backend.collision.closest import ClosePairs, all_pairs, closest_pairs
 from backend.cspace.sun_images import sun_image
 from backend.cspace.sun_pose import sun_pose
+from backend.documents.driving import driving_document
 from backend.documents.margins import margins_document
 from backend.documents.scene import make_scene
 from backend.documents.state import (
@@ -20,6 +21,7 @@ from backend.fusion.crs import SiteFrame
 from backend.fusion.pose import FusedPose
 from backend.machine.model import Machine
 from backend.pipeline.images import SunParameters, pair_key
+from backend.pipeline.place import base_transform
 from backend.pipeline.records import Body3D
 from backend.site.bodies import NO_SITE_BODIES, SiteBodies
 from backend.spatial.boxes import Boxes
@@ -36,7 +38,7 @@ def assess(
     ground: bool = False,
     site: SiteBodies = NO_SITE_BODIES,
 ) -> dict[str, Any]:
-    """Bodies, end-points, closest distances, Sun's sets and margins of one state document.
+    """Bodies, end-points, closest distances, Sun's sets, zones and margins of one state document.
 
     machines: the description of every machine of the document; ground: whether it counts as an
     obstacle to margins; site: what stands on the site besides the document's obstacles. Coordinates
@@ -56,6 +58,13 @@ def assess(
             for own, partner in permutations(poses, 2)
         },
         "margins": {name: margins_document(scene, name, ground) for name in placed},
+        "driving_zone": driving_document(
+            machines,
+            {name: pose.joints for name, pose in poses.items()},
+            {name: base_transform(pose) for name, pose in poses.items()},
+            placed,
+            origin,
+        ),
     }
 
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pydantic import BaseModel, Field
 
+from backend.documents.driving import DrivingZoneDocument
+
 Point = tuple[float, float, float]
 Plane = tuple[float, float]
 Matrix = tuple[Point, Point, Point]
@@ -89,7 +91,7 @@ class MarginDocument(BaseModel):
 
 
 class AssessmentDocument(BaseModel):
-    """One judged state document. Keys of `sun`: "left<-right" is "left must avoid right"."""
+    """One judged state document; in keys "left<-right" is "left must avoid right"."""
 
     time: float = Field(description="[s]")
     frame: str = Field(description="of all coordinates: projected or site")
@@ -98,3 +100,4 @@ class AssessmentDocument(BaseModel):
     obstacles: list[ClosestDocument] = Field(description="one entry per obstacle and machine")
     sun: dict[str, SunDocument]
     margins: dict[str, dict[str, MarginDocument]] = Field(description="by machine and joint role")
+    driving_zone: dict[str, DrivingZoneDocument]
