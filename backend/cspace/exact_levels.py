@@ -79,9 +79,7 @@ def levels(arm: PlanarArm, axes: tuple[Axis, Axis, Axis], kind: int) -> tuple[Le
     )
 
 
-def _level(
-    at: AnyArray, origin: Array, margin: Array, turn: float, axis: Axis, kind: int
-) -> Level:
+def _level(at: AnyArray, origin: Array, margin: Array, turn: float, axis: Axis, kind: int) -> Level:
     x, z = at.real.copy(), at.imag.copy()
     margin = kind * (margin + ROUNDING)
     starts = np.arange(0, len(x), RUN)

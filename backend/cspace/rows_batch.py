@@ -78,13 +78,21 @@ def new_batch(words: int, corners: int) -> Batch:
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def touched_rows(
-    body: Profiles, b: int, polygons: Polygons, k: int, step: float, cells: int, turn: float,
-    batch: Batch, count: int, full: AnyArray,
+    body: Profiles,
+    b: int,
+    polygons: Polygons,
+    k: int,
+    step: float,
+    cells: int,
+    turn: float,
+    batch: Batch,
+    count: int,
+    full: AnyArray,
 ) -> int:
     """Set batch.blocked to the cells where body b is not apart from polygon k, and batch.doubt to
     below 0 where that is not sure. Rows with none are dropped from the first `count`; how many are
     left. full: (words,) the cells that count.
-    """  # fmt: skip
+    """
     close = ERROR / abs(step)
     n = _fill(batch, count)
     batch.blocked[:, :n] = ALL
@@ -142,12 +150,19 @@ def _widest(turn: float) -> float:
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _beyond_polygon(
-    body: Profiles, b: int, polygons: Polygons, k: int, step: float, cells: int, turn: float,
-    batch: Batch, n: int,
+    body: Profiles,
+    b: int,
+    polygons: Polygons,
+    k: int,
+    step: float,
+    cells: int,
+    turn: float,
+    batch: Batch,
+    n: int,
 ) -> int:
     """Clear `blocked` where an edge of the polygon separates, and lower work[0] to the distances of
     the edges' lines. Bits of the edges that some pivot is in front of.
-    """  # fmt: skip
+    """
     depth = body.depth[b] + SLACK
     nearest, c, half, center = (
         batch.work[0, :n], batch.work[1, :n], batch.work[2, :n], batch.work[3, :n]
@@ -183,12 +198,20 @@ def _beyond_polygon(
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _beyond_body(
-    body: Profiles, b: int, polygons: Polygons, k: int, step: float, cells: int, turn: float,
-    batch: Batch, n: int, front: int,
+    body: Profiles,
+    b: int,
+    polygons: Polygons,
+    k: int,
+    step: float,
+    cells: int,
+    turn: float,
+    batch: Batch,
+    n: int,
+    front: int,
 ) -> None:
     """Clear `blocked` where an edge of the body separates. front: edges of the polygon that some
     pivot is in front of; only their corners bound what a line beyond the pivot separates.
-    """  # fmt: skip
+    """
     edges = polygons.sides[k]
     x, z, mask, doubt = batch.x[:n], batch.z[:n], batch.mask, batch.doubt[:n]
     e, half, center = batch.work[1, :n], batch.work[2, :n], batch.work[3, :n]
