@@ -119,7 +119,7 @@ def _finish(
         body, b, polygons, p, level.step, level.cells, level.turn, batch, count, full
     )
     for r in range(count):
-        row = out[batch.index[r]]
+        row = out[batch.place[r]]
         if batch.doubt[r] < 0.0:
             batch.blocked[:, r] = 0
             touched(
@@ -132,7 +132,7 @@ def _finish(
         for w in range(len(row)):
             row[w] |= batch.blocked[w, r] & full[w]
             every = every and row[w] == full[w]
-        done[batch.index[r]] = every
+        done[batch.place[r]] = every
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
@@ -177,7 +177,7 @@ def _rows(
                         near = body.reach[b] + max(level.margin[m], 0.0)
                         if rectangle_distance(low, high, x, z) > near * near:
                             continue
-                        batch.x[count], batch.z[count], batch.index[count] = x, z, m
+                        batch.x[count], batch.z[count], batch.place[count] = x, z, m
                         batch.origin[count], batch.margin[count] = level.origin[m], level.margin[m]
                         count += 1
                         if count == SIZE:

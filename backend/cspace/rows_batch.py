@@ -48,7 +48,7 @@ class Batch(NamedTuple):
     """Rows of one body and one polygon, and room to work.
 
     x, z: (m,) pivots [m]; origin: (m,) angles of the first cells [rad]; margin: (m,) how far the
-    pivots can be from there [m]; index: (m,) which rows of the image they are; blocked, mask:
+    pivots can be from there [m]; place: (m,) which rows of the image they are; blocked, mask:
     (words, m); doubt: (m,) distance of an arc's end from a cell, in cells; work: (9, m); corners:
     (2, v, m) one over their distances, directions.
     """
@@ -57,7 +57,7 @@ class Batch(NamedTuple):
     z: Array
     origin: Array
     margin: Array
-    index: IntArray
+    place: IntArray
     blocked: AnyArray
     mask: AnyArray
     doubt: Array
@@ -123,7 +123,7 @@ def _kept(batch: Batch, count: int, full: AnyArray, close: float) -> int:
             some = some or batch.blocked[w, r] & full[w] != 0
         if not some:
             continue
-        batch.x[kept], batch.z[kept], batch.index[kept] = batch.x[r], batch.z[r], batch.index[r]
+        batch.x[kept], batch.z[kept], batch.place[kept] = batch.x[r], batch.z[r], batch.place[r]
         batch.origin[kept], batch.margin[kept] = batch.origin[r], batch.margin[r]
         batch.doubt[kept], batch.work[0, kept] = batch.doubt[r], batch.work[0, r]
         for w in range(len(full)):

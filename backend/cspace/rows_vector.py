@@ -26,7 +26,7 @@ def least(values: Array) -> float:
     found = values[0]
     for r in range(len(values)):
         found = min(found, values[r])
-    return found
+    return float(found)
 
 
 @njit(cache=True, nogil=True, fastmath={"nnan", "nsz"})  # type: ignore[untyped-decorator]
@@ -35,7 +35,7 @@ def greatest_below(values: Array, limit: float) -> float:
     found = -1e300
     for r in range(len(values)):
         found = max(found, values[r] if values[r] < limit else -1e300)
-    return found
+    return float(found)
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
@@ -51,7 +51,7 @@ def greatest(values: Array) -> float:
     found = values[0]
     for r in range(len(values)):
         found = max(found, values[r])
-    return found
+    return float(found)
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
