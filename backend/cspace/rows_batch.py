@@ -224,7 +224,16 @@ def _beyond_body(
     bearings(ux, uz, 0.0, middle)
     middle -= batch.origin[:n]
     low[:] = 0.0
+    # Beyond an edge that passes behind the pivot, any corner of the polygon may be the last; and
+    # seen from inside of the polygon, all of them show that no line separates.
+    corners = front | front << 1 | front >> (edges - 1)
+    smallest = least(batch.margin[:n])
+    behind = body.offset[b, : body.sides[b]].min() + smallest <= -SLACK
+    if behind or greatest(batch.work[0, :n]) >= smallest - SLACK:
+        corners = -1
     for v in range(edges):
+        if not (corners >> v) & 1:
+            continue
         inverse, at = batch.corners[0, v, :n], batch.corners[1, v, :n]
         px, pz = polygons.x[k, v], polygons.z[k, v]
         inverses(x, z, px, pz, inverse)
@@ -247,8 +256,7 @@ def _beyond_body(
         if lowest >= 0.0:
             low[:], high[:] = -math.pi, math.pi
             for v in range(edges):
-                before = v - 1 if v > 0 else edges - 1
-                if ((front >> v) | (front >> before)) & 1:
+                if (corners >> v) & 1:
                     narrow(e, batch.corners[0, v, :n], batch.corners[1, v, :n], low, high)
             arcs_between(low, high, turn, center, half)
             center += middle
