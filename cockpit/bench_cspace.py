@@ -67,7 +67,6 @@ def _image_rows(
             spread=_spread(1e3 * ours),
             peer="memset",
             peer_value=float(np.median(1e3 * peer)),
-            ratio=float(np.median(peer) / np.median(ours)),
         ),
         BenchRow(
             name=f"{name}, of memset",
