@@ -244,10 +244,12 @@ def _image(
     rows = out.reshape(grid.shape[0], -1, grid.words)
     # Swings side by side cost about the same: each thread takes every so many.
     every = min(os.cpu_count() or 1, grid.shape[0])
-    others = [
-        _pool().submit(image_kernel, *arguments, first, every, rows) for first in range(1, every)
-    ]
-    image_kernel(*arguments, 0, every, rows)
+
+    def fill(first: int) -> None:
+        image_kernel(*arguments, first, every, rows)
+
+    others = [_pool().submit(fill, first) for first in range(1, every)]
+    fill(0)
     for other in others:
         other.result()
     return out

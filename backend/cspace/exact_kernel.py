@@ -39,10 +39,16 @@ class Chain(NamedTuple):
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _box_touches(
-    chain: Chain, group: int, b: int, boxes: tuple[Array, Array, Array], j: int, px: float,
-    pz: float, angle: float,
+    chain: Chain,
+    group: int,
+    b: int,
+    boxes: tuple[Array, Array, Array],
+    j: int,
+    px: float,
+    pz: float,
+    angle: float,
 ) -> bool:
-    """Whether the box of body b, turned by `angle` about its pivot (px, pz), touches obstacle j."""  # fmt: skip
+    """Whether the box of body b, turned by `angle` about its pivot (px, pz), touches obstacle j."""
     c, s = math.cos(angle), math.sin(angle)
     center, R = np.empty(3), np.empty((3, 3))
     x = chain.centers[b, 0] - chain.pivots[group, 0]
@@ -67,12 +73,20 @@ def full_words(n: int) -> AnyArray:
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _keep_box(
-    chain: Chain, group: int, b: int, boxes: tuple[Array, Array, Array], j: int, level: Level,
-    batch: Batch, r: int, full: AnyArray, row: AnyArray,
+    chain: Chain,
+    group: int,
+    b: int,
+    boxes: tuple[Array, Array, Array],
+    j: int,
+    level: Level,
+    batch: Batch,
+    r: int,
+    full: AnyArray,
+    row: AnyArray,
 ) -> None:
     """Clear the bits of row r of the batch in which the box itself does not touch obstacle j; those
     of `row` are known already.
-    """  # fmt: skip
+    """
     for w in range(len(row)):
         batch.blocked[w, r] &= full[w] & ~row[w]
         for bit in range(64):
@@ -85,16 +99,27 @@ def _keep_box(
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _finish(
-    chain: Chain, group: int, b: int, body: Profiles, polygons: Polygons, p: int,
-    boxes: tuple[Array, Array, Array], level: Level, kind: int, batch: Batch, count: int,
-    full: AnyArray, done: BoolArray, out: AnyArray,
+    chain: Chain,
+    group: int,
+    b: int,
+    body: Profiles,
+    polygons: Polygons,
+    p: int,
+    boxes: tuple[Array, Array, Array],
+    level: Level,
+    kind: int,
+    batch: Batch,
+    count: int,
+    full: AnyArray,
+    done: BoolArray,
+    out: AnyArray,
 ) -> None:
-    """Write the rows of a batch to out (m, words); those that are full now are done."""  # fmt: skip
+    """Write the rows of a batch to out (m, words); those that are full now are done."""
     count = touched_rows(
         body, b, polygons, p, level.step, level.cells, level.turn, batch, count, full
     )
     for r in range(count):
-        row = out[batch.index[r]]
+        row = out[batch.place[r]]
         if batch.doubt[r] < 0.0:
             batch.blocked[:, r] = 0
             touched(
@@ -107,18 +132,27 @@ def _finish(
         for w in range(len(row)):
             row[w] |= batch.blocked[w, r] & full[w]
             every = every and row[w] == full[w]
-        done[batch.index[r]] = every
+        done[batch.place[r]] = every
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _rows(
-    chain: Chain, group: int, body: Profiles, polygons: Polygons, pairs: BoolArray,
-    boxes: tuple[Array, Array, Array], level: Level, kind: int, done: BoolArray, batch: Batch,
-    full: AnyArray, out: AnyArray,
+    chain: Chain,
+    group: int,
+    body: Profiles,
+    polygons: Polygons,
+    pairs: BoolArray,
+    boxes: tuple[Array, Array, Array],
+    level: Level,
+    kind: int,
+    done: BoolArray,
+    batch: Batch,
+    full: AnyArray,
+    out: AnyArray,
 ) -> None:
     """Set the bits of out (m, words) that the bodies of the group block, but for rows `done`; rows
     that get full are done, too.
-    """  # fmt: skip
+    """
     for turn in range(2):
         for b in range(len(body.group)):
             # Boxes that are not prisms are dear: they come last, and only for what is still free.
@@ -143,7 +177,7 @@ def _rows(
                         near = body.reach[b] + max(level.margin[m], 0.0)
                         if rectangle_distance(low, high, x, z) > near * near:
                             continue
-                        batch.x[count], batch.z[count], batch.index[count] = x, z, m
+                        batch.x[count], batch.z[count], batch.place[count] = x, z, m
                         batch.origin[count], batch.margin[count] = level.origin[m], level.margin[m]
                         count += 1
                         if count == SIZE:
@@ -160,7 +194,9 @@ def _rows(
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _pass_on(row: AnyArray, n: int, share: int, full: AnyArray, done: BoolArray, out: AnyArray) -> None:
+def _pass_on(
+    row: AnyArray, n: int, share: int, full: AnyArray, done: BoolArray, out: AnyArray
+) -> None:
     """Block the `share` rows of out (m, words) behind each of the first n bits set in row."""
     for i in range(n):
         if (row[i // 64] >> np.uint64(i % 64)) & np.uint64(1):

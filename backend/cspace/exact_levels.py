@@ -60,8 +60,8 @@ def levels(arm: PlanarArm, axes: tuple[Axis, Axis, Axis], kind: int) -> tuple[Le
     """Boom, stick and bucket. axes: the cells of each."""
     boom, stick, bucket = axes
     l1, l2 = np.hypot(*arm.boom), np.hypot(*arm.stick)
-    angle1 = boom.start + boom.step * np.arange(boom.n)
-    angle2 = stick.start + stick.step * np.arange(stick.n)
+    angle1: Array = boom.start + boom.step * np.arange(boom.n, dtype=float)
+    angle2: Array = stick.start + stick.step * np.arange(stick.n, dtype=float)
     v1 = np.exp(1j * angle1) * complex(*arm.boom)
     v2 = (np.exp(1j * angle1)[:, None] * np.exp(1j * angle2)) * complex(*arm.stick)
     at0 = np.array([complex(*arm.pivot)])
@@ -79,9 +79,7 @@ def levels(arm: PlanarArm, axes: tuple[Axis, Axis, Axis], kind: int) -> tuple[Le
     )
 
 
-def _level(
-    at: AnyArray, origin: Array, margin: Array, turn: float, axis: Axis, kind: int
-) -> Level:
+def _level(at: AnyArray, origin: Array, margin: Array, turn: float, axis: Axis, kind: int) -> Level:
     x, z = at.real.copy(), at.imag.copy()
     margin = kind * (margin + ROUNDING)
     starts = np.arange(0, len(x), RUN)

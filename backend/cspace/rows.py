@@ -108,7 +108,8 @@ def touched(
 ) -> None:
     """Set the bits of `out` where body b with its pivot at (px, pz) is not apart from polygon k.
 
-    origin: angle of the first cell; step: from cell to cell [rad]. Bits beyond `cells` mean nothing.
+    origin: angle of the first cell; step: from cell to cell [rad]. Bits beyond `cells` mean
+    nothing.
     """
     corners, edges = body.sides[b], polygons.sides[k]
     free, mask = np.zeros_like(out), np.empty_like(out)

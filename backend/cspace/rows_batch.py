@@ -48,7 +48,7 @@ class Batch(NamedTuple):
     """Rows of one body and one polygon, and room to work.
 
     x, z: (m,) pivots [m]; origin: (m,) angles of the first cells [rad]; margin: (m,) how far the
-    pivots can be from there [m]; index: (m,) which rows of the image they are; blocked, mask:
+    pivots can be from there [m]; place: (m,) which rows of the image they are; blocked, mask:
     (words, m); doubt: (m,) distance of an arc's end from a cell, in cells; work: (9, m); corners:
     (2, v, m) one over their distances, directions.
     """
@@ -57,7 +57,7 @@ class Batch(NamedTuple):
     z: Array
     origin: Array
     margin: Array
-    index: IntArray
+    place: IntArray
     blocked: AnyArray
     mask: AnyArray
     doubt: Array
@@ -78,13 +78,21 @@ def new_batch(words: int, corners: int) -> Batch:
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def touched_rows(
-    body: Profiles, b: int, polygons: Polygons, k: int, step: float, cells: int, turn: float,
-    batch: Batch, count: int, full: AnyArray,
+    body: Profiles,
+    b: int,
+    polygons: Polygons,
+    k: int,
+    step: float,
+    cells: int,
+    turn: float,
+    batch: Batch,
+    count: int,
+    full: AnyArray,
 ) -> int:
     """Set batch.blocked to the cells where body b is not apart from polygon k, and batch.doubt to
     below 0 where that is not sure. Rows with none are dropped from the first `count`; how many are
     left. full: (words,) the cells that count.
-    """  # fmt: skip
+    """
     close = ERROR / abs(step)
     n = _fill(batch, count)
     batch.blocked[:, :n] = ALL
@@ -115,7 +123,7 @@ def _kept(batch: Batch, count: int, full: AnyArray, close: float) -> int:
             some = some or batch.blocked[w, r] & full[w] != 0
         if not some:
             continue
-        batch.x[kept], batch.z[kept], batch.index[kept] = batch.x[r], batch.z[r], batch.index[r]
+        batch.x[kept], batch.z[kept], batch.place[kept] = batch.x[r], batch.z[r], batch.place[r]
         batch.origin[kept], batch.margin[kept] = batch.origin[r], batch.margin[r]
         batch.doubt[kept], batch.work[0, kept] = batch.doubt[r], batch.work[0, r]
         for w in range(len(full)):
@@ -142,12 +150,19 @@ def _widest(turn: float) -> float:
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _beyond_polygon(
-    body: Profiles, b: int, polygons: Polygons, k: int, step: float, cells: int, turn: float,
-    batch: Batch, n: int,
+    body: Profiles,
+    b: int,
+    polygons: Polygons,
+    k: int,
+    step: float,
+    cells: int,
+    turn: float,
+    batch: Batch,
+    n: int,
 ) -> int:
     """Clear `blocked` where an edge of the polygon separates, and lower work[0] to the distances of
     the edges' lines. Bits of the edges that some pivot is in front of.
-    """  # fmt: skip
+    """
     depth = body.depth[b] + SLACK
     nearest, c, half, center = (
         batch.work[0, :n], batch.work[1, :n], batch.work[2, :n], batch.work[3, :n]
@@ -183,12 +198,20 @@ def _beyond_polygon(
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _beyond_body(
-    body: Profiles, b: int, polygons: Polygons, k: int, step: float, cells: int, turn: float,
-    batch: Batch, n: int, front: int,
+    body: Profiles,
+    b: int,
+    polygons: Polygons,
+    k: int,
+    step: float,
+    cells: int,
+    turn: float,
+    batch: Batch,
+    n: int,
+    front: int,
 ) -> None:
     """Clear `blocked` where an edge of the body separates. front: edges of the polygon that some
     pivot is in front of; only their corners bound what a line beyond the pivot separates.
-    """  # fmt: skip
+    """
     edges = polygons.sides[k]
     x, z, mask, doubt = batch.x[:n], batch.z[:n], batch.mask, batch.doubt[:n]
     e, half, center = batch.work[1, :n], batch.work[2, :n], batch.work[3, :n]
@@ -201,7 +224,16 @@ def _beyond_body(
     bearings(ux, uz, 0.0, middle)
     middle -= batch.origin[:n]
     low[:] = 0.0
+    # Beyond an edge that passes behind the pivot, any corner of the polygon may be the last; and
+    # seen from inside of the polygon, all of them show that no line separates.
+    corners = front | front << 1 | front >> (edges - 1)
+    smallest = least(batch.margin[:n])
+    behind = body.offset[b, : body.sides[b]].min() + smallest <= -SLACK
+    if behind or greatest(batch.work[0, :n]) >= smallest - SLACK:
+        corners = -1
     for v in range(edges):
+        if not (corners >> v) & 1:
+            continue
         inverse, at = batch.corners[0, v, :n], batch.corners[1, v, :n]
         px, pz = polygons.x[k, v], polygons.z[k, v]
         inverses(x, z, px, pz, inverse)
@@ -224,8 +256,7 @@ def _beyond_body(
         if lowest >= 0.0:
             low[:], high[:] = -math.pi, math.pi
             for v in range(edges):
-                before = v - 1 if v > 0 else edges - 1
-                if ((front >> v) | (front >> before)) & 1:
+                if (corners >> v) & 1:
                     narrow(e, batch.corners[0, v, :n], batch.corners[1, v, :n], low, high)
             arcs_between(low, high, turn, center, half)
             center += middle

@@ -1,8 +1,8 @@
 """The loops of `rows_batch`: one step each for all rows of a batch.
 
-Each is so small, and works on so few arrays, that it compiles to vector instructions. All arrays
-are (m,) with one entry for each row, words (words, >= m); angles are in radians, and `origin` is the
-angle of a row's first cell.
+Each is so small, and works on so few arrays, that it compiles to vector instructions: numba gives
+that up where it cannot tell that many arrays do not overlap, or that rows lie side by side. All
+arrays are (m,) with one entry for each row, words (words, >= m); angles are in radians.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ def least(values: Array) -> float:
     found = values[0]
     for r in range(len(values)):
         found = min(found, values[r])
-    return found
+    return float(found)
 
 
 @njit(cache=True, nogil=True, fastmath={"nnan", "nsz"})  # type: ignore[untyped-decorator]
@@ -35,7 +35,7 @@ def greatest_below(values: Array, limit: float) -> float:
     found = -1e300
     for r in range(len(values)):
         found = max(found, values[r] if values[r] < limit else -1e300)
-    return found
+    return float(found)
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
@@ -51,7 +51,7 @@ def greatest(values: Array) -> float:
     found = values[0]
     for r in range(len(values)):
         found = max(found, values[r])
-    return found
+    return float(found)
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
@@ -168,13 +168,19 @@ def aside(x: Array, z: Array, px: float, pz: float, ux: Array, uz: Array, out: A
 
 @njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator]
 def mark(
-    center: Array, away: float, half: Array, widest: float, step: float, cells: int,
-    mask: AnyArray, doubt: Array,
+    center: Array,
+    away: float,
+    half: Array,
+    widest: float,
+    step: float,
+    cells: int,
+    mask: AnyArray,
+    doubt: Array,
 ) -> None:
     """Set the cells of mask that are within `half` of center + away, on the circle and from the
     first cell. widest: no half is above it; doubt: least distance so far of an arc's end from a
     cell, in cells.
-    """  # fmt: skip
+    """
     inverse = 1.0 / step
     scale = abs(inverse)
     period = 2.0 * math.pi * scale
