@@ -206,6 +206,8 @@ def test_the_key_x_switches_between_exact_sun_and_difference(feed: ExactFeed) ->
             and feed.shown("reach").get("blocked") == 5
         )
     )
+    feed.page.reload()  # keeps what was chosen
+    feed.send(lambda: feed.shown("reach").get("blocked") == 5 and feed.shows("sun"))
     feed.page.keyboard.press("x")
     feed.send(lambda: feed.shown("slice-0").get("shown") == "difference")
     compared = feed.shown("reach")["compared"]
