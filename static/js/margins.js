@@ -56,6 +56,7 @@ export function motion(name) {
   if (!m) return moves ? { text: "time to contact unknown", seconds: null, known: false } : { text: "at rest", seconds: null, known: true };
   if (!Number.isFinite(m.free)) return { text: "time to contact unknown", seconds: null, known: false };
   if (m.hits && m.free < 0.05) return { text: `within the margin of ${obstacle(name, m.hits)}`, seconds: m.free, known: true };
+  if (m.free > 60) return { text: "on this motion nothing within a minute", seconds: m.free, known: true };
   const text = m.hits ? `on this motion ${obstacle(name, m.hits)} in ${seconds(m.free)}` : `on this motion no contact, limit in ${seconds(m.free)}`;
   return { text, seconds: m.free, known: true };
 }
