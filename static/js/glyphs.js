@@ -93,6 +93,18 @@ export function lampShape(validity, level) {
   return [svg("circle", { cx: 24, cy: 24, r: 21, fill: "none", stroke: C.unknown, "stroke-width": 4, "stroke-dasharray": "8 5" }), question(C.unknown)];
 }
 
+/** The outline of STOP: not now, but it would be. */
+export function octagon(g, x, y, r) {
+  g.beginPath();
+  for (let i = 0; i < 8; i++) g.lineTo(x + r * Math.cos(Math.PI / 8 + (i * Math.PI) / 4), y + r * Math.sin(Math.PI / 8 + (i * Math.PI) / 4));
+  g.closePath();
+  for (const [width, style] of [[4, C.halo], [1.5, C.stopLine]]) {
+    g.lineWidth = width;
+    g.strokeStyle = style;
+    g.stroke();
+  }
+}
+
 /** The same shapes, small, on a canvas. */
 export function levelMark(g, level, x, y, r) {
   g.beginPath();

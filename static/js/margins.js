@@ -25,6 +25,9 @@ export function ways(name, role) {
 /** Contact at full speed can no longer be avoided. At a joint's own limit nothing is hit. */
 export const cannotStop = (way) => Boolean(way && way.hits && way.can_stop === false);
 
+/** It moves that way now: what is else only a possibility is then a danger. */
+export const goesThere = (way) => Boolean(way && Number.isFinite(way.time_now));
+
 /** "18° RIGHT stick · 1.2 s", from the fullest wording to the shortest. */
 export function wayTexts(name, way) {
   if (!way || !Number.isFinite(way.free)) return ["margin unknown", "unknown"];
@@ -52,6 +55,8 @@ export function motion(name) {
   const moves = Object.values(machine(name)?.joint_velocities ?? {}).some((v) => Math.abs(v) > 0.01);
   if (!m) return moves ? { text: "time to contact unknown", seconds: null, known: false } : { text: "at rest", seconds: null, known: true };
   if (!Number.isFinite(m.free)) return { text: "time to contact unknown", seconds: null, known: false };
+  if (m.hits && m.free < 0.05) return { text: `within the margin of ${obstacle(name, m.hits)}`, seconds: m.free, known: true };
+  if (m.free > 60) return { text: "on this motion nothing within a minute", seconds: m.free, known: true };
   const text = m.hits ? `on this motion ${obstacle(name, m.hits)} in ${seconds(m.free)}` : `on this motion no contact, limit in ${seconds(m.free)}`;
   return { text, seconds: m.free, known: true };
 }

@@ -171,12 +171,14 @@ def zone(state_time: float, *, base: tuple[float, float] = (0.0, 0.0), **variant
     return encode({"type": "zone", **names, "state_time": state_time, "variants": given}, arrays)
 
 
-def way(free: float | None, hits: str | None, can_stop: bool = True) -> dict[str, Any]:
+def way(
+    free: float | None, hits: str | None, can_stop: bool = True, time_now: float | None = None
+) -> dict[str, Any]:
     return {
         "free": free,
         "hits": hits,
         "own": "bucket/0" if hits else None,
-        "time_now": None,
+        "time_now": time_now,
         "time_full": None if free is None else free / 0.5,
         "stop_now": 0.02,
         "stop_full": 0.2,
@@ -191,8 +193,8 @@ def margins() -> dict[str, Any]:
             "positive": way(0.31, "right:stick/0"),
         },
         "boom": {
-            "negative": way(0.4, "site:ground"),
-            "positive": way(0.12, "right:boom/1", can_stop=False),
+            "negative": way(0.15, "site:ground", can_stop=False),
+            "positive": way(0.12, "right:boom/1", can_stop=False, time_now=1.2),
         },
         "stick": {"negative": way(1.6, None), "positive": way(0.33, "right:stick/0")},
         "bucket": {"negative": way(1.1, "left:tracks/0"), "positive": way(None, None)},

@@ -6,8 +6,8 @@ import { clear, fit, label, legend, segment, swatches } from "../pen.js";
 import { count, fade, jointKind, paintBytes, swatch } from "../layers.js";
 import { barByte, cellLines, counts, fromLeft, layerWord, presentLayers, stopsInBlocked, toLeft } from "../exact.js";
 import { described, exactImage, imageAge, imageStale, label as nameOf, machine, snapshotAge, state } from "../state.js";
-import { levelMark, ring } from "../glyphs.js";
-import { cannotStop, told, wayLines, ways, wayTexts } from "../margins.js";
+import { levelMark, octagon, ring } from "../glyphs.js";
+import { cannotStop, goesThere, told, wayLines, ways, wayTexts } from "../margins.js";
 import { ageText, staleText } from "../head.js";
 import { pinnedFrom } from "../ghost.js";
 import { row } from "./bars_sun.js";
@@ -122,13 +122,18 @@ export function paint(g, width, height, dpr) {
   return { state: { own: state.own, kind: "exact", joints: values, unit: "deg", bars: drawn, eta: header.eta, state_time: header.state_time, hollow: old }, age, label: `Joints of ${nameOf(state.own)}: ${rows.map((r) => `${r.role} ${degrees(r.now)}${r.ways.length ? ` (${r.ways.map((way) => wayTexts(state.own, way)[0]).join(", ")})` : ""}`).join("; ")}; ${ageText(age)}` };
 }
 
-/** A margin under its end of the bar, with an arrow outwards; red with the octagon when it cannot stop in time. */
+/**
+ * A margin under its end of the bar, with an arrow outwards. An octagon where a stop from full speed would come
+ * too late; filled, and the words red, when the joint moves there now. At rest nothing is filled.
+ */
 function margin(g, way, side, x, y, width, t) {
-  const red = cannotStop(way);
+  const late = cannotStop(way), red = late && goesThere(way);
   const arrow = side ? " ▸" : "◂ ";
   const texts = wayTexts(state.own, way).map((text) => (side ? text + arrow : arrow + text));
-  const shift = red ? t + 3 : 0;
-  if (red) levelMark(g, "STOP", side ? x - t / 2 : x + t / 2, y + 0.45 * t, 0.5 * t);
+  const shift = late ? t + 3 : 0;
+  const mark = [side ? x - t / 2 : x + t / 2, y + 0.45 * t, 0.5 * t];
+  if (red) levelMark(g, "STOP", ...mark);
+  else if (late) octagon(g, ...mark);
   fit(g, texts, side ? x - shift : x + shift, y, width - shift, { align: side ? "right" : "left", base: "top", colour: red ? C.stopLine : C.second, weight: red ? 700 : 400, halo: true });
 }
 
