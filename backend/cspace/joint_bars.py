@@ -39,7 +39,7 @@ def joint_bar(
     T = link_poses(machine, q)
     T_frame_root = transform.inverse(_about(machine, T, joint))
     bodies = body_boxes(machine, T).moved(T_frame_root)
-    carried = machine.body_joints[:, joint]
+    carried: BoolArray = np.asarray(machine.body_joints[:, joint], dtype=bool)
     step = float(edges[1] - edges[0]) / count
     angles = edges[0] + (np.arange(count) + 0.5) * step - q[joint]
     turning = _Turning(bodies, carried, angles, 0.5 * step)
@@ -76,6 +76,7 @@ class _Turning:
 
     def __init__(self, bodies: Boxes, carried: BoolArray, angles: Array, half: float) -> None:
         self._bodies, self._carried = bodies, carried
+        self._moving, self._still = np.flatnonzero(carried), np.flatnonzero(np.logical_not(carried))
         self._angles, self._half = angles, half
 
     def against(self, obstacles: Boxes, kind: int, eta: float = 0.0) -> BoolArray:
@@ -84,8 +85,8 @@ class _Turning:
         if not len(obstacles):
             return out
         grown = self._bodies.inflated(eta) if eta > 0.0 else self._bodies
-        out |= self._meets(grown.take(self._carried), obstacles, kind)
-        standing = grown.take(np.flatnonzero(~self._carried))
+        out |= self._meets(grown.take(self._moving), obstacles, kind)
+        standing = grown.take(self._still)
         out |= touching_swings(
             standing, obstacles, _may_meet(standing, obstacles), np.zeros(1), 0.0, kind
         )
@@ -109,9 +110,8 @@ class _Turning:
         )
         counts[:] = False
         counts[i[~alike], j[~alike]] = counts[j[~alike], i[~alike]] = True
-        moving, still = np.flatnonzero(self._carried), np.flatnonzero(~self._carried)
-        pairs = counts[np.ix_(moving, still)]
-        out |= self._meets(bodies.take(moving), bodies.take(still), kind, pairs)
+        pairs = counts[np.ix_(self._moving, self._still)]
+        out |= self._meets(bodies.take(self._moving), bodies.take(self._still), kind, pairs)
         return out
 
     def _meets(

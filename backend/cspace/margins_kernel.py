@@ -7,8 +7,13 @@ import math
 import numpy as np
 from numba import njit
 
+from backend.collision.box_kernels import pair_distance
 from backend.cspace.exact_boxes import gap
 from backend.spatial.types import Array, IntArray
+
+CLOSE = 0.05
+"""Where something counts as contact before it touches, and a gap is within this of it, the distance
+itself is measured: corner to corner it is larger than the gap along every axis [m]."""
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
@@ -80,6 +85,7 @@ def advance(
     (L, 4, 4) link poses at q; steps: (k,) the least advance.
     """
     n, m, p = len(links), len(others[0]), len(itself)
+    points = np.empty((2, 3))
     centers, rotations = _placed(own, links, T)
     radius, other_radius = np.empty(n), np.empty(m)
     for i in range(n):
@@ -150,6 +156,8 @@ def advance(
                     g = d - radius[i] - rb
                     if g < 0.3 * d:
                         g = max(g, gap(ca, Ra, own[2][i], cb2, Rb2, hb, math.inf))
+                        if 0.0 < g < less + CLOSE and less > 0.0:
+                            g = pair_distance(ca, Ra, own[2][i], cb2, Rb2, hb, points)
                     g -= less
                 if g < rate * steps[k]:
                     free[k], pair[k] = s, c

@@ -37,9 +37,9 @@ class Cells:
     """How many cells the images have along each axis."""
 
     slice: int = 64
-    bar: int = 256
+    bar: int = 180
     volume: int = 32
-    reach: tuple[int, int] = (90, 60)
+    reach: tuple[int, int] = (72, 48)
 
 
 @dataclass(frozen=True)
