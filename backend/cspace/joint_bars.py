@@ -120,8 +120,8 @@ class _Turning:
         may = _ever_meet(own, obstacles)
         if pairs is not None:
             may &= pairs
-        used = may.any(axis=0)
-        if not used.any():
+        used = np.flatnonzero(may.any(axis=0))
+        if not len(used):
             return np.zeros(len(self._angles), dtype=bool)
         return touching_swings(
             own, obstacles.take(used), may[:, used], self._angles, self._half, kind

@@ -101,6 +101,8 @@ def along(
         T,
         q,
         directions,
+        np.where(np.count_nonzero(directions, axis=1) == 1, np.abs(directions).argmax(axis=1), -1),
+        _axes(machine, T),
         ends,
         TOLERANCE / np.maximum(fastest, 1e-300),
     )
@@ -159,6 +161,13 @@ def _levers(machine: Machine, T: Array) -> tuple[Array, Array]:
         squared = np.einsum("bci,bci->bc", offset, offset) - along_axis**2
         now[:, joint] = np.sqrt(np.maximum(squared, 0.0).max(axis=1))
     return np.where(machine.body_joints, now + 1e-9, 0.0), machine.stretched_levers
+
+
+def _axes(machine: Machine, T: Array) -> Array:
+    """(joints, 2, 3) origins and unit vectors of the joints' axes at link poses T, root frame."""
+    links = machine.joint_links
+    axes = (T[links, :3, :3] @ machine.joint_axes[:, :, None])[:, :, 0]
+    return np.stack([T[links, :3, 3], axes], axis=1)
 
 
 def _arrays(boxes: Boxes) -> tuple[Array, Array, Array]:

@@ -59,6 +59,33 @@ def _placed(own: tuple[Array, Array, Array], links: IntArray, T: Array) -> tuple
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def rings(centers: Array, rotations: Array, halves: Array, origin: Array, axis: Array) -> Array:
+    """(n, 4) what boxes cover while they turn about an axis: least and largest distance from it,
+    least and largest place along it [m]. origin: a point of the axis, axis: its unit vector, (3,).
+    """
+    out = np.empty((len(centers), 4))
+    for i in range(len(centers)):
+        at = 0.0
+        for x in range(3):
+            at += (centers[i, x] - origin[x]) * axis[x]
+        away = 0.0
+        for x in range(3):
+            away += (centers[i, x] - origin[x] - at * axis[x]) ** 2
+        away = math.sqrt(away)
+        wide = high = 0.0
+        for b in range(3):
+            dot = 0.0
+            for x in range(3):
+                dot += rotations[i, x, b] * axis[x]
+            high += halves[i, b] * abs(dot)
+            wide += halves[i, b] * math.sqrt(max(1.0 - dot * dot, 0.0))
+        wide = min(wide, math.sqrt((halves[i] ** 2).sum()))
+        out[i, 0], out[i, 1] = away - wide, away + wide
+        out[i, 2], out[i, 3] = at - high, at + high
+    return out
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def advance(
     M: Array,
     parents: IntArray,
@@ -74,6 +101,8 @@ def advance(
     T: Array,
     q: Array,
     directions: Array,
+    alone: IntArray,
+    axes: Array,
     ends: Array,
     steps: Array,
 ) -> tuple[Array, IntArray]:
@@ -82,7 +111,8 @@ def advance(
     Pairs are numbered: first `itself` (p, 2) of own bodies, then own body i against obstacle j as
     p + i m + j. rates: (k, n), itself_rates: (k, p) how fast they move at most, per unit of s;
     eta: gap to an obstacle that counts as contact, wrong: (p,) the same among own bodies [m]; T:
-    (L, 4, 4) link poses at q; steps: (k,) the least advance.
+    (L, 4, 4) link poses at q; alone: (k,) the only joint of a direction, -1 where there are more;
+    axes: (joints, 2, 3) origins and unit vectors at q; steps: (k,) the least advance.
     """
     n, m, p = len(links), len(others[0]), len(itself)
     points = np.empty((2, 3))
@@ -117,6 +147,7 @@ def advance(
             g = max(g, gap(centers[i], rotations[i], own[2][i], cb, Rb, hb, math.inf))
         apart[k] = g - less
     free, pair = ends.copy(), np.full(len(ends), -1, np.int64)
+    turned = around = np.empty((0, 4))
     chosen, safe = np.empty(len(apart), np.int64), np.empty(len(apart))
     ca, cb2 = np.empty(3), np.empty(3)
     Ra, Rb2 = np.empty((3, 3)), np.empty((3, 3))
@@ -124,9 +155,25 @@ def advance(
         if ends[k] <= 0.0:
             continue
         count = 0
+        single = alone[k] >= 0
+        if single:
+            origin, axis = axes[alone[k], 0], axes[alone[k], 1]
+            turned = rings(centers, rotations, own[2], origin, axis)
+            around = rings(others[0], others[1], others[2], origin, axis)
         for c in range(len(apart)):
             rate = itself_rates[k, c] if c < p else rates[k, (c - p) // m]
             if rate > 0.0 and apart[c] < rate * ends[k]:
+                if single:
+                    # What turns about an axis stays in its ring: most pairs can never meet.
+                    i = itself[c, 0] if c < p else (c - p) // m
+                    other = turned[itself[c, 1]] if c < p else around[(c - p) % m]
+                    less = wrong[c] if c < p else eta
+                    ring = turned[i]
+                    if (
+                        max(ring[0], other[0]) > min(ring[1], other[1]) + less
+                        or max(ring[2], other[2]) > min(ring[3], other[3]) + less
+                    ):
+                        continue
                 chosen[count] = c
                 safe[count] = max(apart[c], 0.0) / rate
                 count += 1

@@ -244,6 +244,12 @@ class Machine:
         )
 
     @cached_property
+    def joint_axes(self) -> Array:
+        """(n, 3) unit vectors of the joints' axes in the frames of `joint_links`."""
+        axes = np.array([self.links[k].axis for k in self.joint_links], dtype=float)
+        return np.asarray(axes / np.linalg.norm(axes, axis=1, keepdims=True))
+
+    @cached_property
     def body_joints(self) -> BoolArray:
         """(bodies, n) whether a joint moves a body."""
         moved = np.zeros((len(self.body_links), len(self.joints)), dtype=bool)
