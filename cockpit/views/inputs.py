@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
+
+from shapely.geometry.base import BaseGeometry
 
 from backend.machine.model import Machine
 from backend.pipeline.records import Snapshot
@@ -70,6 +72,20 @@ class ZoneImage(Protocol):
     def state_time(self) -> float: ...
 
 
+class ExactZoneImage(Protocol):
+    """The part of an exact zone of an ordered pair that the ground shows.
+
+    zones: "as_is", "any_swing", "any_posture" -> polygons with holes in the site frame [m], where
+    the own base point must not go; None, or missing, when unknown. state_time [s].
+    """
+
+    @property
+    def zones(self) -> Mapping[str, BaseGeometry | None]: ...
+
+    @property
+    def state_time(self) -> float: ...
+
+
 class SnapshotSource(Protocol):
     """The newest snapshot and images; a hub."""
 
@@ -77,4 +93,9 @@ class SnapshotSource(Protocol):
 
     def wait(self, after_cycle: int, timeout: float) -> Snapshot | None: ...
 
-    def image(self, kind: str, key: str) -> ZoneImage | None: ...
+    def image(self, kind: str, key: str) -> Any | None:
+        """The newest image of a kind, None before there is one.
+
+        "sun": a ZoneImage and "zone": an ExactZoneImage, both per "own<-partner"; "exact": a
+        backend.pipeline.exact.OwnImage, per own machine.
+        """

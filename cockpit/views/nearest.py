@@ -48,7 +48,7 @@ class PairNodes:
         line, words = self._nodes(key)
         line.visible = level is not Level.UNKNOWN
         if level is not self._levels.get(key):
-            line.colors = np.broadcast_to(np.uint8(palette.line(palette.LEVEL[level])), (1, 2, 3))
+            line.colors = np.broadcast_to(palette.pixels(palette.LEVEL[level]), (1, 2, 3))
             line.thickness = WIDTH.get(level, 2.0)
             self._levels[key] = level
         if np.abs(line.points[0] - points).max() > 5e-4:

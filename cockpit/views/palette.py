@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import numpy as np
+from numpy.typing import NDArray
+
 from backend.safety.record import Level
 
 Rgb = tuple[int, int, int]
@@ -24,6 +27,11 @@ REACH_NOW = rgb("#BCCBD7")
 REACH_MAX = rgb("#94A6B4")
 PARTNER = rgb("#A970F0")
 SITE = rgb("#3E8E78")
+SELF = rgb("#C0B8D9")
+UNDECIDED = rgb("#8A949E")
+BLOCKED = rgb("#FF6B5E")  # a stopping distance that does not end in what is certified free
+GHOST = rgb("#DDE4EA")  # what a machine would look like
+GHOST_HIT = rgb("#E0655E")  # and would touch something
 STALE = rgb("#8A949E")
 EDGE = rgb("#0B0F13")
 PAINT = rgb("#D8D8D8")  # of machines described without colours; tinted when drawn
@@ -50,6 +58,11 @@ def line(color: Rgb) -> Rgb:
     """What to send for a line so that it shows in `color`: viser takes vertex colours as linear."""
     linear = [((c / 255.0 + 0.055) / 1.055) ** 2.4 if c > 10 else c / 255.0 / 12.92 for c in color]
     return round(255 * linear[0]), round(255 * linear[1]), round(255 * linear[2])
+
+
+def pixels(color: Rgb) -> NDArray[np.uint8]:
+    """`line`, as the array (3,) that a line's colours are set with."""
+    return np.array(line(color), dtype=np.uint8)
 
 
 def tint(color: Rgb, machine_tint: Rgb) -> Rgb:

@@ -8,6 +8,7 @@ import numpy as np
 import shapely
 import trimesh
 from numpy.typing import NDArray
+from shapely.geometry.base import BaseGeometry
 
 from backend.machine.model import Machine
 from backend.spatial.boxes import Boxes
@@ -25,6 +26,17 @@ BOX_FACES: UInt32 = np.array(
         *((0, 2, 6), (0, 6, 4), (1, 5, 7), (1, 7, 3)),
     ],
     dtype=np.uint32,
+)
+
+# The twelve edges of the unit cube, (12, 2, 3).
+BOX_EDGES: Float32 = np.array(
+    [
+        np.roll([[0, u, v], [1, u, v]], axis, axis=1)
+        for axis in range(3)
+        for u in (0, 1)
+        for v in (0, 1)
+    ],
+    dtype=np.float32,
 )
 
 
@@ -84,25 +96,57 @@ def polyline(points: Array, closed: bool, z: float = 0.0) -> Float32:
     return np.stack([flat if closed else flat[:-1], ends], axis=1).astype(np.float32)
 
 
+def dashed(ring: Array, on: float, off: float) -> Float32:
+    """A closed outline (n, 2), not closed itself, as dashes that bend with it: (k, 2, 3).
+
+    on, off: lengths of dashes and gaps [m], fitted to whole dashes around the outline.
+    """
+    closed = np.concatenate([ring, ring[:1]])
+    lengths = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(closed, axis=0), axis=1))])
+    if not lengths[-1] > 0.0:
+        return np.zeros((0, 2, 3), dtype=np.float32)
+    count = max(1, round(lengths[-1] / (on + off)))
+    period = lengths[-1] / count
+    starts = period * np.arange(count)
+    drawn = period * on / (on + off)
+    knots = np.unique(np.concatenate([lengths, starts, starts + drawn]))
+    knots = knots[np.diff(knots, prepend=-1.0) > 1e-9]
+    points = np.column_stack([np.interp(knots, lengths, closed[:, k]) for k in (0, 1)])
+    middle = (knots[:-1] + knots[1:]) / 2.0
+    return polyline(points, closed=False)[middle % period < drawn]
+
+
+def rings(geometry: BaseGeometry | None) -> list[Array]:
+    """Every outline (n, 2) of the polygons in a geometry, holes too, not closed."""
+    found = []
+    for part in shapely.get_parts(geometry):
+        if isinstance(part, shapely.Polygon) and not part.is_empty:
+            found += [np.asarray(ring.coords)[:-1, :2] for ring in (part.exterior, *part.interiors)]
+    return found
+
+
 def filled(polygon: Array) -> tuple[Float32, UInt32]:
     """Triangles of a polygon's inside, normals up: vertices (n, 3) at z = 0, faces (m, 3).
 
     polygon: (k, 2), not closed; one that crosses itself is repaired first. Nothing for zero area.
     """
-    nothing = np.zeros((0, 3), dtype=np.float32), np.zeros((0, 3), dtype=np.uint32)
     if len(polygon) < 3 or not np.isfinite(polygon).all():
-        return nothing
-    shape = shapely.make_valid(shapely.Polygon(polygon))
-    triangles = [
-        np.asarray(part.exterior.coords)[:3]
-        for part in shapely.get_parts(shapely.constrained_delaunay_triangles(shape))
-        if part.area > 0.0
-    ]
-    if not triangles:
-        return nothing
-    corners = np.stack(triangles)
+        return _NOTHING
+    return filled_geometry(shapely.make_valid(shapely.Polygon(polygon)))
+
+
+def filled_geometry(shape: BaseGeometry) -> tuple[Float32, UInt32]:
+    """Triangles of a valid geometry's polygons, their holes left open; as `filled`."""
+    triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(shape))
+    triangles = triangles[shapely.area(triangles) > 0.0]
+    if not len(triangles):
+        return _NOTHING
+    corners = shapely.get_coordinates(triangles).reshape(-1, 4, 2)[:, :3].copy()
     u, v = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     clockwise = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0] < 0.0
     corners[clockwise] = corners[clockwise][:, ::-1]
     flat = np.pad(corners.reshape(-1, 2), ((0, 0), (0, 1)))
     return flat.astype(np.float32), np.arange(len(flat), dtype=np.uint32).reshape(-1, 3)
+
+
+_NOTHING = np.zeros((0, 3), dtype=np.float32), np.zeros((0, 3), dtype=np.uint32)

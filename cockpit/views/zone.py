@@ -10,10 +10,13 @@ import viser
 
 from backend.pipeline.records import Snapshot
 from cockpit.views import palette
+from cockpit.views.exact_zone import ExactZoneNodes, known
 from cockpit.views.inputs import SnapshotSource, ZoneImage
 from cockpit.views.shapes import filled, polyline
 
 OLD = 1.0  # [s] after which an image is no longer coloured
+EXACT, SUN = "exact", "sun"
+ZONE_KINDS = (EXACT, SUN)
 CROSS = np.array([[[-1, 0, 0], [1, 0, 0]], [[0, -1, 0], [0, 1, 0]]], dtype=np.float32)
 
 
@@ -33,15 +36,24 @@ class OwnNodes:
             visible=False,
         )
         self._zones: dict[str, ZoneNodes] = {}
+        self._exact: dict[str, ExactZoneNodes] = {}
 
     def remove(self) -> None:
         """Take all of it out of the browser."""
         self._scene.remove_by_name("/own")
 
     def update(
-        self, snapshot: Snapshot, images: SnapshotSource, ground: float, lost: float
+        self,
+        snapshot: Snapshot,
+        images: SnapshotSource,
+        ground: float,
+        lost: float,
+        kind: str = EXACT,
     ) -> None:
-        """The zones of all partners of `own`; ground: its height [m]; lost: as in Scene [s]."""
+        """The zones of all partners of `own`; ground: its height [m]; lost: as in Scene [s].
+
+        kind: "exact" draws the exact zone of each partner, and Sun's while there is none.
+        """
         state = snapshot.machines.get(self.own)
         body = state.body if state is not None else None
         self._cross.visible = body is not None
@@ -50,14 +62,24 @@ class OwnNodes:
             self._cross.position = (float(x), float(y), ground + 0.03)
         # No images are made of far pairs: an old zone would only look like a warning.
         far = {frozenset((pair.a, pair.b)) for pair in snapshot.pairs if not pair.near}
+        now = snapshot.state_time + lost
         for partner in snapshot.machines:
-            image = None
-            if partner != self.own and frozenset((self.own, partner)) not in far:
-                image = images.image("sun", f"{self.own}<-{partner}")
-            if image is not None and partner not in self._zones:
+            if partner == self.own:
+                continue
+            near = frozenset((self.own, partner)) not in far
+            key = f"{self.own}<-{partner}"
+            exact = images.image("zone", key) if near and kind == EXACT else None
+            if not known(exact):
+                exact = None
+            sun = images.image("sun", key) if near and exact is None else None
+            if sun is not None and partner not in self._zones:
                 self._zones[partner] = ZoneNodes(self._scene, f"/own/zone/{partner}")
+            if exact is not None and partner not in self._exact:
+                self._exact[partner] = ExactZoneNodes(self._scene, f"/own/exact/{partner}")
             if partner in self._zones:
-                self._zones[partner].update(image, snapshot.state_time + lost, ground)
+                self._zones[partner].update(sun, now, ground)
+            if partner in self._exact:
+                self._exact[partner].update(exact, now, ground)
 
 
 class ZoneNodes:
@@ -118,4 +140,4 @@ class ZoneNodes:
     def _paint_edge(self) -> None:
         color = palette.STALE if self._old else palette.PARTNER
         shape = (len(self._edge.points), 2, 3)
-        self._edge.colors = np.broadcast_to(np.uint8(palette.line(color)), shape)
+        self._edge.colors = np.broadcast_to(palette.pixels(color), shape)
