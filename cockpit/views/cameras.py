@@ -17,7 +17,7 @@ ELEVATION = np.deg2rad(32.0)  # of the site camera
 ASPECT = 1.65  # width to height that the cameras are laid out for
 JOINTS_FOV = np.deg2rad(30.0)
 JOINTS_FROM = np.array([0.5, -1.0, 0.5])  # of the box of the joint-space view
-JOINTS_MARGIN = 1.32  # what the axes' names take, as a share of the box
+JOINTS_MARGIN = 1.1  # what the axes' names take, as a share of the box
 REACH_UNPLACED = 8.0  # [m] drawn around the origin before any machine is placed
 
 
@@ -118,7 +118,7 @@ def _behind(site: SceneSite, name: str, placed: dict[str, Body3D]) -> CameraPose
 
 def _joints(aspect: float) -> CameraPose:
     """In front of the joint-space view's box, the whole of it in the picture."""
-    center = np.array(PLACE) + SIZE / 2.0 + [0.0, 0.0, 0.1 * SIZE[2]]
+    center = np.array(PLACE) + SIZE / 2.0 + [0.0, 0.0, 0.04 * SIZE[2]]
     radius = JOINTS_MARGIN * float(np.linalg.norm(SIZE)) / 2.0
     distance = radius / np.sin(JOINTS_FOV / 2.0) / min(max(aspect, 0.3), 1.0)
     away = JOINTS_FROM / np.linalg.norm(JOINTS_FROM)

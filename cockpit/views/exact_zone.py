@@ -11,7 +11,7 @@ from shapely.geometry.base import BaseGeometry
 
 from cockpit.views import palette
 from cockpit.views.inputs import ExactZoneImage
-from cockpit.views.shapes import Float32, dashed, filled_geometry, polyline, rings
+from cockpit.views.shapes import NO_LINE, Float32, dashed, filled_geometry, polyline, rings
 
 OLD = 2.0  # [s] after which a zone is no longer coloured: it is made about twice a second
 DRAWN = 0.005  # how far the drawing may be from the zone [m]
@@ -57,8 +57,8 @@ class ExactZoneNodes:
         self._lines = {
             variant: scene.add_line_segments(
                 f"{name}/{variant}",
-                np.zeros((1, 2, 3), dtype=np.float32),
-                palette.line(palette.PARTNER),
+                NO_LINE,
+                palette.each(palette.PARTNER, NO_LINE),
                 thickness=width,
                 thickness_units="screen",
                 position=(0.0, 0.0, 0.006),
@@ -101,8 +101,8 @@ class ExactZoneNodes:
 
     def _paint(self) -> None:
         self._fill.visible = self._area and not self._old
-        color = palette.pixels(palette.STALE if self._old else palette.PARTNER)
+        color = palette.STALE if self._old else palette.PARTNER
         for node in self._lines.values():
-            colors = np.broadcast_to(color, node.points.shape)
+            colors = palette.each(color, node.points)
             if not np.array_equal(node.colors, colors):
                 node.colors = colors

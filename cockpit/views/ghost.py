@@ -20,7 +20,7 @@ from cockpit.views import palette
 from cockpit.views.inputs import SceneMachine
 from cockpit.views.shapes import feature_edges, link_meshes
 
-OPACITY = 0.34
+OPACITY = 0.42
 SAME = 2e-3  # a link this close to the real one is left out [m, -]
 STILL = 2e-4  # change of a pose's entries that is worth a message [m, -]
 RAISED = 0.3  # the label over the arm [m]
@@ -92,8 +92,8 @@ class GhostNodes:
                 scene.add_line_segments(
                     f"{root}/edges",
                     edges,
-                    palette.line(palette.TEXT),
-                    thickness=2.0,
+                    palette.each(palette.TEXT, edges),
+                    thickness=1.6,
                     thickness_units="screen",
                 )
             )
@@ -110,9 +110,9 @@ class GhostNodes:
             self._colliding = colliding
             for mesh in self._meshes:
                 mesh.color = palette.GHOST_HIT if colliding else palette.GHOST
-            color = palette.pixels(palette.BLOCKED if colliding else palette.TEXT)
+            color = palette.BLOCKED if colliding else palette.TEXT
             for edges in self._edges:
-                edges.colors = np.broadcast_to(color, edges.points.shape)
+                edges.colors = palette.each(color, edges.points)
             self._label.text = WORDS[colliding]
 
     def update(self, snapshot: Snapshot) -> None:

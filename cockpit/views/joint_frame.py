@@ -72,7 +72,7 @@ def draw_frame(scene: viser.SceneApi, root: str, edges: Array) -> None:
     """Make the nodes under `root` for a volume's edges (3, 2) [rad]."""
     scene.add_frame(root, show_axes=False)
     for name, lines, color, width in (
-        ("walls", wall_lines(edges), palette.GRID_MAJOR, 1.2),
+        ("walls", wall_lines(edges), palette.REACH_MAX, 1.0),
         ("box", box_lines(), palette.SECONDARY, 1.8),
     ):
         scene.add_line_segments(
@@ -84,14 +84,14 @@ def draw_frame(scene: viser.SceneApi, root: str, edges: Array) -> None:
             scene.add_label(
                 f"{root}/{joint}/{degrees}",
                 f"{degrees}",
-                position=on_axis(axis, share, 0.28),
+                position=on_axis(axis, share, 0.26),
                 font_screen_scale=1.0,
                 anchor="center-center",
             )
         scene.add_label(
             f"{root}/{joint}/name",
             f"{joint} °",
-            position=on_axis(axis, 0.5, 0.85),
+            position=on_axis(axis, 0.5, 1.05),
             font_screen_scale=1.4,
             anchor="center-center",
         )

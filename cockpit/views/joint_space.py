@@ -17,7 +17,7 @@ from cockpit.views import palette
 from cockpit.views.joint_frame import PLACE, SIDE, SIZE, draw_frame, place
 from cockpit.views.joint_marks import full_box, plumb_lines, stop_bars
 from cockpit.views.labels import Words
-from cockpit.views.shapes import Float32, UInt32
+from cockpit.views.shapes import NO_LINE, Float32, UInt32
 from cockpit.views.surface import NAMES, UNDECIDED, surfaces
 
 OLD = 1.0  # [s] after which an image is no longer coloured
@@ -30,7 +30,8 @@ COLORS = {
     "other": palette.TEXT,
     UNDECIDED: palette.UNDECIDED,
 }
-SHELL = 0.16  # opacity of the undecided cells
+BODY, BODY_OLD = 0.78, 0.45  # opacity of the colliding cells: the star shows through them
+SHELL = 0.14  # of the undecided cells
 STAR = 0.085  # radius [m]
 Meshes = dict[str, tuple[Float32, UInt32]]
 
@@ -45,6 +46,7 @@ class JointSpace:
         self._root = scene.add_frame("/joints", show_axes=False, position=PLACE, visible=False)
         self._cells = scene.add_frame("/joints/cells", show_axes=False, visible=False)
         self._meshes = {name: _mesh(scene, name) for name in NAMES}
+        self._legend_root = scene.add_frame("/joints/cells/legend", show_axes=False)
         self._legend = [_legend(scene, name, k) for k, name in enumerate(NAMES)]
         self._star = scene.add_icosphere(
             "/joints/cells/star", STAR, (255, 255, 255), subdivisions=3, cast_shadow=False
@@ -129,7 +131,8 @@ class JointSpace:
         for name, node in self._meshes.items():
             node.color = palette.STALE if self._old else COLORS[name]
             if name != UNDECIDED:
-                node.opacity = 0.5 if self._old else None
+                node.opacity = BODY_OLD if self._old else BODY
+        self._legend_root.visible = not self._old  # it would explain colours that are not there
         self._star.color = palette.STALE if self._old else (255, 255, 255)
 
 
@@ -146,7 +149,7 @@ def _mesh(scene: viser.SceneApi, name: str) -> viser.MeshHandle:
         np.array([[0, 0, 0], [1e-3, 0, 0], [0, 1e-3, 0]], dtype=np.float32),
         np.array([[0, 1, 2]], dtype=np.uint32),
         color=COLORS[name],
-        opacity=SHELL if shell else None,
+        opacity=SHELL if shell else BODY,
         side="double" if shell else "front",
         flat_shading=True,
         cast_shadow=False,
@@ -177,11 +180,10 @@ def _legend_place(row: int) -> tuple[float, float, float]:
 def _lines(
     scene: viser.SceneApi, name: str, pixels: float, color: palette.Rgb
 ) -> viser.LineSegmentsHandle:
-    nothing = np.zeros((1, 2, 3), dtype=np.float32)
     return scene.add_line_segments(
         f"/joints/cells/{name}",
-        nothing,
-        palette.line(color),
+        NO_LINE,
+        palette.each(color, NO_LINE),
         thickness=pixels,
         thickness_units="screen",
     )
@@ -191,6 +193,6 @@ def _draw(node: viser.LineSegmentsHandle, points: Float32, colors: Any) -> None:
     """New lines; colors: uint8 (k, 2, 3), or one colour."""
     node.points = points
     if not isinstance(colors, np.ndarray):
-        colors = np.broadcast_to(palette.pixels(colors), points.shape)
+        colors = palette.each(colors, points)
     if not np.array_equal(node.colors, colors):
         node.colors = colors

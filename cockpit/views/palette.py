@@ -60,9 +60,13 @@ def line(color: Rgb) -> Rgb:
     return round(255 * linear[0]), round(255 * linear[1]), round(255 * linear[2])
 
 
-def pixels(color: Rgb) -> NDArray[np.uint8]:
-    """`line`, as the array (3,) that a line's colours are set with."""
-    return np.array(line(color), dtype=np.uint8)
+def each(color: Rgb, points: NDArray[np.float32]) -> NDArray[np.uint8]:
+    """`line` for every end of lines `points` (k, 2, 3), as uint8 (k, 2, 3).
+
+    Lines whose colour changes later are made with this: the browser shows a line that was made
+    with a single colour in white once it gets one for each end.
+    """
+    return np.broadcast_to(np.array(line(color), dtype=np.uint8), points.shape)
 
 
 def tint(color: Rgb, machine_tint: Rgb) -> Rgb:

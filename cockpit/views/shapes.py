@@ -28,6 +28,9 @@ BOX_FACES: UInt32 = np.array(
     dtype=np.uint32,
 )
 
+# What a node of lines is made with before there is anything to draw.
+NO_LINE: Float32 = np.zeros((1, 2, 3), dtype=np.float32)
+
 # The twelve edges of the unit cube, (12, 2, 3).
 BOX_EDGES: Float32 = np.array(
     [

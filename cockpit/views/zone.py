@@ -12,7 +12,7 @@ from backend.pipeline.records import Snapshot
 from cockpit.views import palette
 from cockpit.views.exact_zone import ExactZoneNodes, known
 from cockpit.views.inputs import SnapshotSource, ZoneImage
-from cockpit.views.shapes import filled, polyline
+from cockpit.views.shapes import NO_LINE, filled, polyline
 
 OLD = 1.0  # [s] after which an image is no longer coloured
 EXACT, SUN = "exact", "sun"
@@ -100,8 +100,8 @@ class ZoneNodes:
         )
         self._edge = scene.add_line_segments(
             f"{name}/edge",
-            np.zeros((1, 2, 3), dtype=np.float32),
-            palette.line(palette.PARTNER),
+            NO_LINE,
+            palette.each(palette.PARTNER, NO_LINE),
             thickness=2.5,
             thickness_units="screen",
             position=(0.0, 0.0, 0.006),
@@ -139,5 +139,4 @@ class ZoneNodes:
 
     def _paint_edge(self) -> None:
         color = palette.STALE if self._old else palette.PARTNER
-        shape = (len(self._edge.points), 2, 3)
-        self._edge.colors = np.broadcast_to(palette.pixels(color), shape)
+        self._edge.colors = palette.each(color, self._edge.points)
