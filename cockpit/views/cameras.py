@@ -118,8 +118,8 @@ def _behind(site: SceneSite, name: str, placed: dict[str, Body3D]) -> CameraPose
 
 def _joints(aspect: float) -> CameraPose:
     """In front of the joint-space view's box, the whole of it in the picture."""
-    center = np.array(PLACE) + SIZE / 2.0 + [0.0, 0.0, 0.04 * SIZE[2]]
+    center = np.array(PLACE) + SIZE / 2.0 + [0.0, 0.0, -0.04 * SIZE[2]]
     radius = JOINTS_MARGIN * float(np.linalg.norm(SIZE)) / 2.0
-    distance = radius / np.sin(JOINTS_FOV / 2.0) / min(max(aspect, 0.3), 1.0)
+    distance = radius / np.sin(JOINTS_FOV / 2.0) / min(max(aspect, 0.3) / 1.3, 1.0)
     away = JOINTS_FROM / np.linalg.norm(JOINTS_FROM)
     return CameraPose(center + distance * away, center, float(JOINTS_FOV))

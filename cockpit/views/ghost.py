@@ -18,7 +18,7 @@ from backend.spatial.rotation import to_quaternion
 from backend.spatial.types import Array
 from cockpit.views import palette
 from cockpit.views.inputs import SceneMachine
-from cockpit.views.shapes import feature_edges, link_meshes
+from cockpit.views.shapes import LinkLooks
 
 OPACITY = 0.42
 SAME = 2e-3  # a link this close to the real one is left out [m, -]
@@ -57,7 +57,7 @@ class GhostNodes:
         self._meshes: list[viser.MeshHandle] = []
         self._edges: list[viser.LineSegmentsHandle] = []
         for index in range(len(entry.model.links)):
-            self._add_link(scene, f"{root}/{index}", index)
+            self._add_link(scene, f"{root}/{index}", index, entry.ghost_looks[index])
         self._label = scene.add_label(
             f"{root}/words", WORDS[None], font_screen_scale=1.4, anchor="bottom-center"
         )
@@ -68,12 +68,11 @@ class GhostNodes:
         self._joints: Mapping[str, float] | None = None
         self._colliding: bool | None = None
 
-    def _add_link(self, scene: viser.SceneApi, root: str, index: int) -> None:
-        meshes = link_meshes(self._model, index)
-        if not meshes:
+    def _add_link(self, scene: viser.SceneApi, root: str, index: int, looks: LinkLooks) -> None:
+        if not looks.meshes:
             return
         self._frames[index] = scene.add_frame(root, show_axes=False)
-        for k, (vertices, faces, _) in enumerate(meshes):
+        for k, (vertices, faces, _) in enumerate(looks.meshes):
             handle = scene.add_mesh_simple(
                 f"{root}/{k}",
                 vertices,
@@ -86,13 +85,12 @@ class GhostNodes:
                 receive_shadow=False,
             )
             self._meshes.append(handle)
-        edges = np.concatenate([feature_edges(vertices, faces) for vertices, faces, _ in meshes])
-        if len(edges):
+        if len(looks.edges):
             self._edges.append(
                 scene.add_line_segments(
                     f"{root}/edges",
-                    edges,
-                    palette.each(palette.TEXT, edges),
+                    looks.edges,
+                    palette.each(palette.TEXT, looks.edges),
                     thickness=1.6,
                     thickness_units="screen",
                 )

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, Protocol
 
 from shapely.geometry.base import BaseGeometry
@@ -13,6 +14,9 @@ from backend.pipeline.records import Snapshot
 from backend.site.site import Site
 from backend.spatial.boxes import Boxes
 from backend.spatial.types import Array
+from cockpit.views.shapes import LinkLooks, link_looks
+
+GHOST_FACES = 8000  # of a machine whose ghost is drawn as the machine looks
 
 
 @dataclass(frozen=True)
@@ -21,6 +25,19 @@ class SceneMachine:
 
     label: str
     model: Machine
+
+    @cached_property
+    def looks(self) -> tuple[LinkLooks, ...]:
+        """How each link looks; worked out once, for the machine and all of its ghosts."""
+        return tuple(link_looks(self.model, k) for k in range(len(self.model.links)))
+
+    @cached_property
+    def ghost_looks(self) -> tuple[LinkLooks, ...]:
+        """`looks`, or the bodies where those are so detailed that a ghost would come late."""
+        if sum(len(faces) for link in self.looks for _, faces, _ in link.meshes) <= GHOST_FACES:
+            return self.looks
+        bare = replace(self.model, links=tuple(replace(k, visuals=()) for k in self.model.links))
+        return tuple(link_looks(bare, k) for k in range(len(bare.links)))
 
 
 @dataclass(frozen=True)

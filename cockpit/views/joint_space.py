@@ -32,6 +32,7 @@ COLORS = {
 }
 BODY, BODY_OLD = 0.78, 0.45  # opacity of the colliding cells: the star shows through them
 SHELL = 0.14  # of the undecided cells
+TITLE = (0.5 * SIDE, 0.5 * SIDE, SIDE + 0.7)  # where the words stand [m]
 STAR = 0.085  # radius [m]
 Meshes = dict[str, tuple[Float32, UInt32]]
 
@@ -57,10 +58,9 @@ class JointSpace:
         self._plumb = _lines(scene, "plumb", 1.2, palette.SECONDARY)
         self._bars = _lines(scene, "now", 4.5, palette.TEXT)
         self._full = _lines(scene, "full", 1.4, palette.TEXT)
-        top = (0.5 * SIDE, 0.5 * SIDE, SIDE + 0.7)
         self._title = Words(
             scene.add_label(
-                "/joints/title", "", position=top, font_screen_scale=1.7, anchor="bottom-center"
+                "/joints/title", "", position=TITLE, font_screen_scale=1.7, anchor="bottom-center"
             )
         )
         self._image: OwnImage | None = None
@@ -112,7 +112,7 @@ class JointSpace:
             node.visible = entry.visible = len(faces) > 0
             if len(faces):
                 node.vertices, node.faces = vertices, faces
-                entry.position = _legend_place(row)
+                entry.position = legend_place(row)
                 row += 1
 
     def _mark(self, image: OwnImage, old: bool) -> None:
@@ -160,7 +160,7 @@ def _mesh(scene: viser.SceneApi, name: str) -> viser.MeshHandle:
 
 def _legend(scene: viser.SceneApi, name: str, row: int) -> viser.FrameHandle:
     root = f"/joints/cells/legend/{name}"
-    entry = scene.add_frame(root, show_axes=False, position=_legend_place(row), visible=False)
+    entry = scene.add_frame(root, show_axes=False, position=legend_place(row), visible=False)
     scene.add_icosphere(f"{root}/sample", 0.11, COLORS[name], subdivisions=2, cast_shadow=False)
     scene.add_label(
         f"{root}/name",
@@ -172,7 +172,7 @@ def _legend(scene: viser.SceneApi, name: str, row: int) -> viser.FrameHandle:
     return entry
 
 
-def _legend_place(row: int) -> tuple[float, float, float]:
+def legend_place(row: int) -> tuple[float, float, float]:
     """Right of the box, from above."""
     return SIDE + 0.55, SIDE + 0.25, SIDE - 0.3 - 0.42 * row
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -62,6 +63,21 @@ def link_meshes(machine: Machine, link: int) -> list[tuple[Float32, UInt32, Rgb 
         return [(*_joined(parts), color) for color, parts in by_color.items()]
     bodies = [k for k, owner in enumerate(machine.body_links) if owner == link]
     return [(*box_mesh(machine.bodies.take(bodies)), None)] if bodies else []
+
+
+@dataclass(frozen=True)
+class LinkLooks:
+    """One mesh per colour of a link (see `link_meshes`), and its sharp edges (k, 2, 3) [m]."""
+
+    meshes: list[tuple[Float32, UInt32, Rgb | None]]
+    edges: Float32
+
+
+def link_looks(machine: Machine, link: int) -> LinkLooks:
+    """In the link's frame."""
+    meshes = link_meshes(machine, link)
+    edges = [feature_edges(vertices, faces) for vertices, faces, _ in meshes]
+    return LinkLooks(meshes, np.concatenate([NO_LINE[:0], *edges]))
 
 
 def _joined(parts: list[tuple[Array, Any]]) -> tuple[Float32, UInt32]:
