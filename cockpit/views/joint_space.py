@@ -30,7 +30,7 @@ COLORS = {
     "other": palette.TEXT,
     UNDECIDED: palette.UNDECIDED,
 }
-BODY, BODY_OLD = 0.78, 0.45  # opacity of the colliding cells: the star shows through them
+BODY, BODY_OLD = 0.70, 0.45  # opacity of the colliding cells: the star shows through them
 SHELL = 0.14  # of the undecided cells
 TITLE = (0.5 * SIDE, 0.5 * SIDE, SIDE + 0.7)  # where the words stand [m]
 STAR = 0.085  # radius [m]
@@ -54,6 +54,14 @@ class JointSpace:
         )
         self._outline = scene.add_icosphere(
             "/joints/cells/star/outline", 1.35 * STAR, (0, 0, 0), side="back", cast_shadow=False
+        )
+        # Words are never hidden by cells: they tell where the star is behind them.
+        scene.add_label(
+            "/joints/cells/star/name",
+            label,
+            position=(0.0, 0.0, 2.4 * STAR),
+            font_screen_scale=0.9,
+            anchor="bottom-center",
         )
         self._plumb = _lines(scene, "plumb", 1.2, palette.SECONDARY)
         self._bars = _lines(scene, "now", 4.5, palette.TEXT)
@@ -92,7 +100,7 @@ class JointSpace:
             self._old = old
             self._paint()
         self._image = image
-        swing = math.degrees(float(image.q[0]))
+        swing = math.degrees(math.remainder(float(image.q[0]), math.tau))
         self._title.show(title(self._label, swing, age, old), old, now)
 
     def _draw_cells(self, image: OwnImage, now: float) -> None:

@@ -147,6 +147,7 @@ class View:
         with self._lock:
             if page is None:
                 self._camera = name
+                self._set_initial(snapshot)
             for browser in self._of(page):
                 client = browser.client
                 pose = camera_pose(name, self._site, snapshot, browser.own, client.camera.aspect)
@@ -193,7 +194,6 @@ class View:
             for name in self._site.machines
         ):
             self._framed = True  # from here on, cameras move only when asked
-            self._set_initial(snapshot)
             with self._lock:
                 untouched = self._camera
             self.set_camera(untouched)

@@ -15,6 +15,7 @@ from cockpit.views import palette
 from cockpit.views.browser import Browser
 from cockpit.views.joint_frame import PLACE, place
 from cockpit.views.joint_space import BODY, JointSpace, title
+from cockpit.views.server import start
 
 CELLS = "/joints/cells"
 
@@ -182,3 +183,23 @@ def test_another_own_machine_starts_from_nothing(server: viser.ViserServer) -> N
     window.own = "left"
     window.update(snapshot, source, 0.0, 0.2, 0.0)
     assert handle(server, f"{CELLS}/partner").visible
+
+
+def test_windows_that_come_later_look_there_too() -> None:
+    source = toy.Source()
+    source.put(toy.snapshot())
+    view = start(toy.site(), source)
+    try:
+        view.set_camera("joints")
+        look_at = np.array(view._server.initial_camera.look_at)
+        np.testing.assert_allclose(look_at[:2], np.array(PLACE)[:2] + 2.0)
+        assert look_at[2] < -1000.0
+    finally:
+        view.stop()
+
+
+def test_the_swing_is_within_half_a_turn(server: viser.ViserServer) -> None:
+    space = JointSpace(server.scene, "LEFT")
+    image = toy.own_image(volume(), 0.0, q=(2 * np.pi - 0.5, 0.0, -0.5, 0.5))
+    space.update(image, 0.1, 0.1, looked_at=True)
+    assert handle(server, "/joints/title").text == "LEFT at swing -29° · 0.1 s"
