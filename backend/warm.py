@@ -2,21 +2,50 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
+
 import numpy as np
 from rich.progress import track
 
 from backend.collision.closest import closest_pairs
+from backend.cspace.driving import driving_zone, turning_zone
+from backend.cspace.joint_image import certified4, joint4
+from backend.cspace.margins import margins
+from backend.cspace.reach_image import reach_image
+from backend.cspace.regions import regions
 from backend.machine.load import load_machine, shipped_machines
+from backend.machine.outline import outlines_of
+from backend.pipeline.place import place
+from backend.spatial import rotation, transform
 from backend.spatial.boxes import Boxes
 
 
+def compile_kernels() -> None:
+    """Call every compiled kernel once, so that the first live cycle finds it ready."""
+    machine = load_machine("mini")
+    q = np.zeros(len(machine.joints))
+    tilted = transform.make(rotation.from_attitude(0.2, 0.05, 0.03), np.zeros(3))
+    body = place(machine, q, transform.make(np.eye(3), np.array([4.0, 0.0, 0.0])))
+    near: Boxes = body.boxes
+    closest_pairs(near, near)
+    outlines_of(machine, near)
+    margins(machine, q, near, 0.1, np.full(len(q), 0.01))
+    layers = {"partner": near}
+    joint4(machine, layers, (3, 3, 3, 3))
+    free = certified4(machine, layers, 0.1, (3, 3, 3, 3)).certified_free()
+    regions(free, (0, 0, 0, 0), wraps=True)
+    reach_image(machine, q, layers, (4, 4))
+    for base in (np.eye(4), tilted):
+        driving_zone(machine, q, base, near, 0.1)
+        turning_zone(machine, q, base, near, eta=0.1)
+
+
 def main() -> None:
-    one = Boxes(np.zeros((1, 3)), np.eye(3)[None], np.ones((1, 3)))
-    for name in track(["kernels", *shipped_machines()], "Preparing", transient=True):
-        if name == "kernels":
-            closest_pairs(one, one)
-        else:
-            load_machine(name)
+    steps: list[tuple[str, Callable[[], object]]] = [("kernels", compile_kernels)]
+    steps += [(name, partial(load_machine, name)) for name in shipped_machines()]
+    for _, prepare in track(steps, "Preparing", transient=True):
+        prepare()
 
 
 if __name__ == "__main__":

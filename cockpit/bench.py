@@ -24,8 +24,9 @@ from backend.pipeline.records import Snapshot
 from backend.pipeline.step import initial, step
 from backend.site.site import Site, load_site
 from backend.spatial import rotation, transform
+from cockpit.bench_cspace import cspace_rows
 from cockpit.bench_input import cycles
-from cockpit.bench_live import live_rows
+from cockpit.bench_live import crowded_rows, live_rows
 from cockpit.bench_rows import percentile_rows
 from cockpit.station import load_models, make_config
 
@@ -41,7 +42,9 @@ def run_bench(as_json: bool, seconds: float) -> None:
     parts: list[tuple[str, Callable[[], list[BenchRow]]]] = [
         ("fast loop and images", lambda: pipeline_rows(site, config)),
         ("distances", lambda: distance_rows(next(iter(models.values())))),
+        ("joint images", cspace_rows),
         ("live, over Zenoh", lambda: live_rows(seconds)),
+        ("live, on a crowded site", lambda: crowded_rows(seconds)),
     ]
     with Progress(console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("bench", total=len(parts))

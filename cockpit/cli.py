@@ -29,6 +29,9 @@ NoBrowser = Annotated[bool, typer.Option("--no-browser", help="Do not open a bro
 Listen = Annotated[
     list[str] | None, typer.Option(help="Zenoh endpoint to listen on, e.g. tcp/127.0.0.1:7447.")
 ]
+Ground = Annotated[
+    bool, typer.Option("--ground", help="The plane under the tracks is an obstacle, too.")
+]
 Connect = Annotated[
     list[str] | None, typer.Option(help="Zenoh endpoint to connect to: a router, another backend.")
 ]
@@ -99,15 +102,58 @@ def assess(
     every_pair: Annotated[
         bool, typer.Option("--all", help="Every pair of bodies in `closest`, not only the nearest.")
     ] = False,
+    ground: Ground = False,
     json_: Annotated[
         bool, typer.Option("--json", help="Print JSON; this command always does.")
     ] = True,
 ) -> None:
-    """Judge one set of machine states: bodies, distances and Sun's sets, as JSON."""
+    """Judge one set of machine states: bodies, distances, sets, zones, margins; as JSON."""
     del json_
     from cockpit.assess import run_assess
 
-    run_assess(state, site, every_pair)
+    run_assess(state, site, every_pair, ground)
+
+
+@app.command()
+def cspace(
+    state: Annotated[Path, typer.Option(help="State document (.json).")],
+    machine: Annotated[str, typer.Option(help="The machine of the document that must avoid.")],
+    out: Annotated[Path, typer.Option(help="The .npz file to write.")],
+    kind: Annotated[
+        str, typer.Option(help="joint4, joint3 (at the present swing) or reach (swing x reach).")
+    ] = "joint4",
+    shape: Annotated[str, typer.Option(help="Cells along each axis, e.g. 72,64,64,64.")] = "",
+    site: Annotated[
+        str | None, typer.Option(help="Site of the positions' CRS and of more obstacles.")
+    ] = None,
+    certified: Annotated[
+        bool, typer.Option("--certified", help="Also what holds for every configuration in a cell.")
+    ] = False,
+    layers: Annotated[
+        bool, typer.Option("--layers", help="Also what is hit: partner, site, self, ground.")
+    ] = False,
+    ground: Ground = False,
+    height: Annotated[
+        float | None,
+        typer.Option(help="Reach: height of the tip above the swing joint [m]; else as it is."),
+    ] = None,
+    json_: Annotated[bool, typer.Option("--json", help="Print JSON instead of words.")] = False,
+) -> None:
+    """Write one exact C-space image with axes, units and layers to an .npz file."""
+    from backend.documents.cspace import KINDS, Request
+    from cockpit.cspace import run_cspace
+
+    chosen = next((known for known in KINDS if known == kind), None)
+    if chosen is None:
+        raise InputError(f'--kind "{kind}" is unknown; allowed are {", ".join(KINDS)}.')
+    try:
+        cells = tuple(int(n) for n in shape.split(",")) if shape else None
+    except ValueError:
+        raise InputError(
+            f'--shape "{shape}" is not a shape; allowed are whole numbers like 72,64,64,64.'
+        ) from None
+    request = Request(chosen, cells, certified, layers, ground, height)
+    run_cspace(state, site, machine, request, out, json_)
 
 
 @app.command()

@@ -8,7 +8,7 @@ import math
 import sys
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -24,6 +24,7 @@ from backend.machine.model import Machine
 from backend.pipeline.config import Config
 from backend.pipeline.images import SunParameters
 from backend.pipeline.records import Snapshot
+from backend.pipeline.whatif import what_if
 from backend.safety.partner import Limits
 from backend.shell.app.app import Sources, create_app
 from backend.shell.app.feed import Frames
@@ -31,15 +32,19 @@ from backend.shell.app.server import WebServer, bind
 from backend.shell.app.viewer_proxy import Hooks, viewer_router
 from backend.shell.app.wire import dumps
 from backend.shell.hub import Hub
+from backend.shell.kinds import image_kinds
 from backend.shell.link.receiver import Receiver
 from backend.shell.link.relay import Relay
 from backend.shell.link.session import open_session
 from backend.shell.link.source import LinkSource
 from backend.shell.runner import Runner
+from backend.site.bodies import site_bodies
 from backend.site.site import Site
+from backend.spatial.types import Array
 from cockpit.views.inputs import scene_site
 from cockpit.views.server import HEAD, View, start
 
+MAX_HEIGHT = 50.0  # of a picked bucket tip above or below the swing joint [m]
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
 
 
@@ -90,6 +95,7 @@ def make_config(site: Site, models: dict[str, Machine], own: tuple[str, ...], mo
         limits=Limits(site.safety.slow_below, site.safety.stop_below),
         eta=site.safety.eta,
         mode=mode,
+        site=site_bodies(site),
     )
 
 
@@ -123,19 +129,23 @@ class Station:
         models = load_models(site)
         self.config = make_config(site, models, options.own, options.mode)
         self._demo_began = demo_began
+        self._tip_heights: dict[str, float] = {}
         self.hub = Hub()
         session = open_session(options.listen, options.connect, mode="router")
         self._closing.callback(session.close)
         prefixes = {machine.prefix: machine.name for machine in site.machines}
         self.receiver = Receiver(session, prefixes)
         self._closing.callback(self.receiver.close)
-        self.runner = Runner(
+        kinds = image_kinds(
             self.config,
             SunParameters(site.sun.m, site.sun.n, site.sun.eta),
-            LinkSource(self.receiver),
-            self.hub,
-            site.rates.step_hz,
             site.rates.image_hz,
+            site.rates.zone_hz,
+            self._tip_heights.get,
+        )
+        self._hz = (site.rates.image_hz, site.rates.zone_hz)
+        self.runner = Runner(
+            self.config, kinds, LinkSource(self.receiver), self.hub, site.rates.step_hz
         )
         frames = Frames(self.hub, self.document)
         relay = Relay(session, self.hub, self._texts, frames.images)
@@ -146,6 +156,7 @@ class Station:
             frames=frames,
             backend=self.backend,
             on_message=self._on_message,
+            what_if=self._what_if,
         )
         hooks = Hooks(opened=self.view.attach, closed=self.view.detach)
         loopback = options.host in LOOPBACK
@@ -173,7 +184,7 @@ class Station:
     def document(self, snapshot: Snapshot) -> dict[str, Any]:
         """A snapshot as plain JSON, with what only a running backend knows."""
         document = snapshot_document(snapshot, self.config)
-        rate = self.runner.image_timing.timing().rate
+        rate = self.runner.image_timing[self._hz[0]].timing().rate
         if rate > 0.0:
             document["resolution"] = _resolutions(snapshot, self.config, 1.0 / rate)
         document["backend"] = self.backend()
@@ -189,20 +200,64 @@ class Station:
         """Live timings of both loops."""
         return {
             "step": vars(self.runner.step_timing.timing()),
-            "images": vars(self.runner.image_timing.timing()),
+            "images": vars(self.runner.image_timing[self._hz[0]].timing()),
+            "zones": vars(self.runner.image_timing[self._hz[1]].timing()),
             "failure": self.runner.failure,
         }
 
+    def _what_if(self, own: str, joints: dict[str, float]) -> dict[str, Any]:
+        """python-fcl's verdict on a posture of `own`; joints that are not named stay."""
+        snapshot = self.hub.latest()
+        if own not in self.config.own:
+            known = ", ".join(self.config.own)
+            raise InputError(f'machine is "{own}"; allowed are {known}.')
+        if snapshot is None:
+            raise InputError("no cycle has finished yet; try again.")
+        q = self._posture(own, joints, snapshot)
+        found = what_if(snapshot, self.config, own, q)
+        roles = [joint.role for joint in self.config.machines[own].joints]
+        posture = dict(zip(roles, q.tolist(), strict=True))
+        return {**asdict(found), "joints": posture, "checked_by": "python-fcl"}
+
+    def _posture(self, own: str, joints: dict[str, float], snapshot: Snapshot) -> Array:
+        """(n,) the present joint values of a machine with those of `joints` in their places."""
+        machine = self.config.machines[own]
+        roles = [joint.role for joint in machine.joints]
+        unknown = [role for role in joints if role not in roles]
+        if unknown:
+            raise InputError(f"joints.{unknown[0]} is unknown; allowed are {', '.join(roles)}.")
+        q = snapshot.machines[own].pose.joints.copy()
+        for role, value in joints.items():
+            q[roles.index(role)] = value
+        return q
+
     def _on_message(self, message: dict[str, Any]) -> None:
-        """What a page asks of the scene; anything else is ignored."""
+        """What a page asks of the scene and the images; anything else is ignored."""
         page, name = message.get("page"), message.get("name", message.get("machine"))
-        if not isinstance(name, str) or not (page is None or isinstance(page, str)):
+        kind = message.get("type")
+        if not (page is None or isinstance(page, str)):
             return
-        with contextlib.suppress(ValueError):
-            if message.get("type") == "camera":
+        with contextlib.suppress(ValueError, InputError):
+            if kind == "ghost":
+                joints = message.get("joints")
+                self.view.set_ghost(name, joints if isinstance(joints, dict) else None, page)
+            elif kind == "zones":
+                self.view.set_zone_kind(str(message.get("kind")), page)
+            elif not isinstance(name, str):
+                return
+            elif kind == "camera":
                 self.view.set_camera(name, page)
-            elif message.get("type") == "own":
+            elif kind == "own":
                 self.view.set_own(name, page)
+            elif kind == "tip_height" and name in self.config.own:
+                self._pick_height(name, message.get("height"))
+
+    def _pick_height(self, own: str, height: Any) -> None:
+        """The height of a machine's reach image, for all pages; None: as the tip is."""
+        if height is None:
+            self._tip_heights.pop(own, None)
+        elif isinstance(height, int | float) and abs(height) < MAX_HEIGHT:
+            self._tip_heights[own] = float(height)
 
 
 def _resolutions(

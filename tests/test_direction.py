@@ -26,7 +26,7 @@ ROOMS: dict[str, set[str]] = {
     "backend.safety": {"backend.collision", "backend.machine", "backend.spatial"},
     "backend.pipeline": {
         *("backend.safety", "backend.cspace", "backend.collision", "backend.fusion"),
-        *("backend.machine", "backend.spatial", "backend.errors"),
+        *("backend.site", "backend.machine", "backend.spatial", "backend.errors"),
     },
     "backend.documents": {
         *("backend.pipeline", "backend.safety", "backend.cspace", "backend.collision"),
@@ -34,7 +34,10 @@ ROOMS: dict[str, set[str]] = {
         "backend.errors",
     },
     "backend.shell": {"backend"},
-    "backend.warm": {"backend.collision", "backend.machine", "backend.spatial"},
+    "backend.warm": {
+        *("backend.pipeline", "backend.cspace", "backend.collision", "backend.machine"),
+        "backend.spatial",
+    },
     "cockpit": {"backend", "cockpit"},
 }
 

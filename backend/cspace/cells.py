@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -19,6 +21,7 @@ from backend.cspace.exact import (
 )
 from backend.machine.model import Machine
 from backend.spatial.boxes import Boxes, concatenated
+from backend.spatial.identity import ByIdentity
 from backend.spatial.types import AnyArray, Array
 
 PARTNER, SITE, SELF = 1, 2, 4
@@ -26,6 +29,9 @@ PARTNER, SITE, SELF = 1, 2, 4
 
 FREE, COLLIDING = 64, 128
 """Bits of a cell: certified for every configuration in it. With neither, the cell is undecided."""
+
+ETA_STEP = 0.005
+"""Models are made for multiples of this growth [m]."""
 
 LAYER_BITS = {"partner": PARTNER, "site": SITE, "self": SELF}
 
@@ -45,9 +51,21 @@ class CellModels:
 
 
 def cell_models(machine: Machine, q: Array, eta: float, slack: Array) -> CellModels:
-    """q: (n,) [rad], of which tilt and rotate are held; eta, slack: see CellModels."""
-    built, grown = arm_model(machine, q), arm_model(machine, q, eta)
-    return CellModels(machine, eta, np.asarray(slack, dtype=float)[:4], built, grown)
+    """q: (n,) [rad], of which tilt and rotate are held; eta, slack: see CellModels.
+
+    eta is taken up to the next ETA_STEP, so that models can be kept from cycle to cycle.
+    """
+    steps = math.ceil(eta / ETA_STEP - 1e-9)
+    rest = tuple(np.asarray(q, dtype=float)[4:].tolist())
+    built, grown = (_model(ByIdentity(machine), rest, k) for k in (0, steps))
+    return CellModels(machine, grown.inflation, np.asarray(slack, dtype=float)[:4], built, grown)
+
+
+@lru_cache(maxsize=256)
+def _model(machine: ByIdentity[Machine], rest: tuple[float, ...], steps: int) -> ArmModel:
+    q = np.zeros(len(machine.value.joints))
+    q[4:] = rest
+    return arm_model(machine.value, q, ETA_STEP * steps)
 
 
 def coded(models: CellModels, grid: JointGrid, layers: Mapping[str, Boxes]) -> AnyArray:

@@ -14,12 +14,13 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
+from backend.cspace.driving_cover import cover
 from backend.cspace.driving_posture import moved, swept_arm
 from backend.cspace.driving_profile import Revolved, revolve
 from backend.cspace.driving_revolved import revolved_pieces
 from backend.cspace.driving_tilted import tilted_pieces
 from backend.cspace.driving_turning import turning_pieces
-from backend.cspace.minkowski import Pieces, cover, joined_pieces, slice_pieces
+from backend.cspace.minkowski import Pieces, joined_pieces, slice_pieces
 from backend.machine import kinematics
 from backend.machine.model import Machine
 from backend.spatial import transform
@@ -28,6 +29,9 @@ from backend.spatial.types import Array, BoolArray
 
 TOLERANCE = 8e-4
 """How far a drawn zone may exceed the true one [m]."""
+
+SLOPE_TOLERANCE = 1e-2
+"""The same for what swings about an axis that is not upright [m]: cavities are larger than this."""
 
 _LEVEL = 1e-9
 """A swing axis this close to upright counts as upright [rad]."""
@@ -72,21 +76,27 @@ def driving_zone(
     partner_boxes: Boxes,
     eta: float = 0.0,
     tolerance: float = TOLERANCE,
+    view: float = np.inf,
 ) -> DrivingZone:
     """All three variants of the zone that `own_machine` must not drive into.
 
     own_q: (n,) [rad]; T_own_base: (4, 4), the URDF root in any frame with z up; partner_boxes: in
     the same frame; eta: inflation [m], every partner box grown by it on every side (this contains
-    the ball of radius eta). The first call for a machine sweeps its arm and takes about a second.
+    the ball of radius eta); view: the zone is complete within this distance of the base [m], boxes
+    that cannot matter there are left out, and a distance above it means "farther than the view".
+    The first call for a machine sweeps its arm and takes about a second.
     Raises ValueError for a negative or infinite eta and a tolerance that is not positive.
     """
     _check(eta, tolerance)
     T, bodies = _local(T_own_base, partner_boxes, eta)
+    to_swing = float(np.linalg.norm(own_machine.arm.T_root_swing[:3, 3]))
+    bodies = _in_view(bodies, own_machine.bounding_radius + to_swing + view)
     own = kinematics.body_boxes(own_machine, kinematics.link_poses(own_machine, own_q, T))
     tracks = np.array([own_machine.part_of_body(b) == "tracks" for b in range(len(own))])
     parked = slice_pieces(bodies, own.take(tracks))
+    upright = np.hypot(*T[:2, 2]) <= _LEVEL
     # Half of the tolerance for the radii of the solid, half for drawing its arcs.
-    part = 0.5 * tolerance
+    part = 0.5 * (tolerance if upright else max(tolerance, SLOPE_TOLERANCE))
     now = cover(slice_pieces(bodies, own))
     swing = cover(
         joined_pieces([parked, _swinging(own_machine, own, own_q, tracks, T, bodies, part)])
@@ -180,6 +190,12 @@ def _local(T_own_base: Array, partner_boxes: Boxes, eta: float) -> tuple[Array, 
         partner_boxes.centers - base, partner_boxes.rotations, partner_boxes.half_extents
     )
     return T, bodies.inflated(eta) if eta > 0.0 else bodies
+
+
+def _in_view(bodies: Boxes, radius: float) -> Boxes:
+    """The boxes whose bounding spheres come within `radius` [m] of the vertical at the origin."""
+    apart = np.hypot(bodies.centers[:, 0], bodies.centers[:, 1])
+    return bodies.take(apart - np.linalg.norm(bodies.half_extents, axis=1) <= radius)
 
 
 def _check(eta: float, tolerance: float) -> None:

@@ -20,20 +20,8 @@ from backend.machine import kinematics
 from backend.machine.model import PARTS, Machine
 from backend.spatial import transform
 from backend.spatial.boxes import Boxes
+from backend.spatial.identity import ByIdentity
 from backend.spatial.types import Array, IntArray
-
-
-class _Same:
-    """A machine as a key: itself, not its arrays."""
-
-    def __init__(self, machine: Machine) -> None:
-        self.machine = machine
-
-    def __hash__(self) -> int:
-        return id(self.machine)
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Same) and self.machine is other.machine
 
 
 def swept_arm(machine: Machine, tolerance: float) -> Revolved:
@@ -42,12 +30,12 @@ def swept_arm(machine: Machine, tolerance: float) -> Revolved:
     About the swing axis, heights from the swing joint's origin [m]. Contains the true solid and
     exceeds its radii by at most about `tolerance` [m]. Computed once per machine and tolerance.
     """
-    return _swept(_Same(machine), tolerance)
+    return _swept(ByIdentity(machine), tolerance)
 
 
 @lru_cache(maxsize=32)
-def _swept(key: _Same, tolerance: float) -> Revolved:
-    machine = key.machine
+def _swept(key: ByIdentity[Machine], tolerance: float) -> Revolved:
+    machine = key.value
     q = np.array(
         [0.0 if j.continuous else float(np.clip(0.0, j.lower, j.upper)) for j in machine.joints]
     )

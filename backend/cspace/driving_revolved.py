@@ -26,9 +26,11 @@ def revolved_pieces(solid: Revolved, bodies: Boxes, tolerance: float) -> Pieces:
     the zone of the solid and exceed it by at most `tolerance` [m].
     """
     corners = thickened(bodies).corners()
-    return Pieces(
-        *_zones(corners, EDGES, solid.z, solid.inner, solid.outer, solid.start, tolerance)
+    points, start, holes, hole_end = _zones(
+        corners, EDGES, solid.z, solid.inner, solid.outer, solid.start, tolerance
     )
+    owner = np.flatnonzero(np.diff(hole_end))
+    return Pieces(points, start, holes, np.append(0, hole_end[owner + 1]), owner)
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
@@ -38,9 +40,7 @@ def _sides(radius: float, tolerance: float) -> int:
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _cut(
-    corners: Array, edges: IntArray, z: Array, inner: Array, outer: Array, disks: Array
-) -> int:
+def cut(corners: Array, edges: IntArray, z: Array, inner: Array, outer: Array, disks: Array) -> int:
     """Vertices of a box cut at the heights of a run: disks (n, 4) = x, y, outer, inner; n."""
     bottom = max(corners[:, 2].min(), z[0])
     top = min(corners[:, 2].max(), z[-1])
@@ -219,7 +219,7 @@ def _zones(
     for k in range(len(start) - 1):
         run = slice(start[k], start[k + 1])
         for i in range(len(corners)):
-            n = _cut(corners[i], edges, z[run], inner[run], outer[run], disks)
+            n = cut(corners[i], edges, z[run], inner[run], outer[run], disks)
             if n == 0:
                 continue
             n = _needed(disks, n)

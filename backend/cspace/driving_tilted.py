@@ -4,21 +4,28 @@ For a body a and a convex run k the zone is the slice at height 0 of the Minkows
 Its support in a horizontal direction u is min over b of h(u cos b + z sin b) / cos b, h being the
 support of the difference (the dual of maximising u over the slice), and every b gives a line that
 bounds the zone from outside. Lines are added where the polygon still exceeds the chord of two
-points of the zone by more than the tolerance. Cavities around the axis are filled: never unsafe,
-and too large where a body would hang inside one.
+points of the zone by more than the tolerance. Places where the body hangs free inside the solid,
+around its axis, are holes (`driving_cavity`).
 """
 
 from __future__ import annotations
 
 import numpy as np
+import shapely
 from numba import njit
 
+from backend.cspace.driving_cavity import cavities
+from backend.cspace.driving_cover import union
+from backend.cspace.driving_hidden import outermost
 from backend.cspace.driving_profile import Revolved, thickened
-from backend.cspace.minkowski import Pieces, convex_hull
+from backend.cspace.minkowski import Pieces, convex_hull, polygons, solid_pieces
 from backend.spatial.boxes import Boxes
 from backend.spatial.types import Array, IntArray
 
-_BISECTIONS = 46
+_STEPS = 60
+_NEAR = 0.05
+"""How close a line must come to the zone, in parts of the tolerance."""
+
 _MOST = 2048
 
 
@@ -26,10 +33,10 @@ def tilted_pieces(solid: Revolved, T_site_axis: Array, bodies: Boxes, tolerance:
     """Shifts (x, y) [m] of the solid for which it touches a body, as pieces of a union.
 
     T_site_axis: (4, 4), the frame of the solid's axis where it stands; bodies: boxes in the site
-    frame, z up.
+    frame, z up. The pieces contain the zone of the solid and exceed it by about `tolerance` [m].
     """
     a = thickened(bodies)
-    points, start = _tilted(
+    points, start, pairs = _tilted(
         *(np.ascontiguousarray(v) for v in (a.centers, a.rotations, a.half_extents)),
         np.ascontiguousarray(T_site_axis[:3, 3]),
         np.ascontiguousarray(T_site_axis[:3, 2]),
@@ -38,7 +45,27 @@ def tilted_pieces(solid: Revolved, T_site_axis: Array, bodies: Boxes, tolerance:
         solid.start,
         tolerance,
     )
-    return Pieces(points, start, np.zeros((0, 2)), np.zeros_like(start))
+    outlines = solid_pieces(points, start)
+    most = np.maximum.reduceat(solid.inner, solid.start[:-1]) if len(solid) else np.zeros(0)
+    hollow = most[pairs[:, 0]] > tolerance
+    if not hollow.any():
+        return outlines
+    # A free place lies in cavities of outermost outlines and outside of all that have none; only
+    # the cavities of what reaches into such a place matter.
+    outer = np.flatnonzero(outermost(points, start) & hollow)
+    bounds = np.array([points.min(axis=0), points.max(axis=0)])
+    places = union(polygons(*cavities(solid, T_site_axis, a, pairs[outer], bounds, tolerance)[:2]))
+    every = np.array(polygons(points, start), dtype=object)
+    shapely.prepare(places)
+    filled = every[~hollow]
+    places = shapely.difference(places, union(list(filled[shapely.intersects(filled, places)])))
+    if places.is_empty:
+        return outlines
+    shapely.prepare(places)
+    mine = np.flatnonzero(hollow & shapely.intersects(every, places))
+    bounds = np.array(places.bounds).reshape(2, 2)
+    holes, hole_start, owner = cavities(solid, T_site_axis, a, pairs[mine], bounds, tolerance)
+    return Pieces(points, start, holes, hole_start, mine[owner])
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
@@ -78,31 +105,40 @@ def _extreme(
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _line(c: Array, R: Array, h: Array, o: Array, k: Array, z: Array, r: Array, row: Array) -> None:
-    """For the direction row[:2]: the bound of the zone into row[2], a point of it into row[3:5]."""
-    low, high = -0.5 * np.pi + 1e-6, 0.5 * np.pi - 1e-6
+def _line(
+    c: Array,
+    R: Array,
+    h: Array,
+    o: Array,
+    k: Array,
+    z: Array,
+    r: Array,
+    ends: Array,
+    near: float,
+    row: Array,
+) -> None:
+    """For the direction row[:2]: the bound of the zone into row[2], a point of it into row[3:5].
+
+    ends (2, 3): points of the difference below and above height 0. The chord of two such points
+    crosses height 0 in the zone; the support in its normal direction bounds the zone, and its point
+    replaces the end on its side, until both are within `near` of each other.
+    """
     w, p = np.empty(3), np.empty(3)
-    below, above = np.empty(3), np.empty(3)
-    bound = np.inf
-    under, over = False, False
-    for step in range(_BISECTIONS):
-        b = low if step == 0 else (high if step == 1 else 0.5 * (low + high))
-        w[0], w[1], w[2] = row[0] * np.cos(b), row[1] * np.cos(b), np.sin(b)
-        bound = min(bound, _extreme(c, R, h, o, k, z, r, w, p) / np.cos(b))
+    below, above = ends[0].copy(), ends[1].copy()
+    w[0], w[1] = row[0], row[1]
+    row[2] = np.inf
+    for _ in range(_STEPS):
+        rise = max(above[2] - below[2], 1e-12)
+        w[2] = -(row[0] * (above[0] - below[0]) + row[1] * (above[1] - below[1])) / rise
+        s = min(max(-below[2] / rise, 0.0), 1.0)
+        row[3:5] = below[:2] + s * (above[:2] - below[:2])
+        row[2] = min(row[2], _extreme(c, R, h, o, k, z, r, w, p))
+        if row[2] - row[0] * row[3] - row[1] * row[4] <= near:
+            break
         if p[2] <= 0.0:
-            low, under = b, True
             below[:] = p
         else:
-            high, over = b, True
             above[:] = p
-        if step == 1 and not (under and over):
-            break
-    row[2] = bound
-    if under and over:
-        s = below[2] / (below[2] - above[2])
-        row[3:5] = below[:2] + s * (above[:2] - below[:2])
-    else:
-        row[3:5] = below[:2] if under else above[:2]
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
@@ -114,17 +150,19 @@ def _outline(
     k: Array,
     z: Array,
     r: Array,
+    ends: Array,
     tolerance: float,
     corners: Array,
 ) -> int:
     """Vertices of the circumscribed polygon of one pair, their number."""
+    near = _NEAR * tolerance
     stack = np.empty((128, 5))
     first, row = np.empty(5), np.empty(5)
     n = 0
     for d in range(4):
         angle = 0.5 * np.pi * (3 - d)
         stack[d, 0], stack[d, 1] = np.cos(angle), np.sin(angle)
-        _line(c, R, h, o, k, z, r, stack[d])
+        _line(c, R, h, o, k, z, r, ends, near, stack[d])
     first[:] = stack[3]
     row[:] = first
     size = 3
@@ -150,7 +188,7 @@ def _outline(
             between = row[0] * ny - row[1] * nx > 1e-7 and nx * ahead[1] - ny * ahead[0] > 1e-7
             if excess > tolerance and between and size < 127 and n < len(corners) - 4:
                 stack[size, 0], stack[size, 1] = nx, ny
-                _line(c, R, h, o, k, z, r, stack[size])
+                _line(c, R, h, o, k, z, r, ends, near, stack[size])
                 size += 1
                 continue
             corners[n] = x, y
@@ -178,25 +216,27 @@ def _tilted(
     outer: Array,
     start: IntArray,
     tolerance: float,
-) -> tuple[Array, IntArray]:
+) -> tuple[Array, IntArray, IntArray]:
     points = np.empty((4096, 2))
     ends = np.zeros(len(ca) * (len(start) - 1) + 1, np.int64)
     corners, ring = np.empty((_MOST, 2)), np.empty((_MOST, 2))
-    up, down, p = np.array([0.0, 0.0, 1.0]), np.array([0.0, 0.0, -1.0]), np.empty(3)
+    up, down, top_bottom = np.array([0.0, 0.0, 1.0]), np.array([0.0, 0.0, -1.0]), np.empty((2, 3))
+    pair = np.empty((len(ends), 2), np.int64)
     made = 0
     for e in range(len(start) - 1):
         run = slice(start[e], start[e + 1])
         for i in range(len(ca)):
             body = (ca[i], Ra[i], ha[i])
-            if _extreme(*body, o, k, z[run], outer[run], up, p) < 0.0:
+            if _extreme(*body, o, k, z[run], outer[run], up, top_bottom[1]) < 0.0:
                 continue
-            if _extreme(*body, o, k, z[run], outer[run], down, p) < 0.0:
+            if _extreme(*body, o, k, z[run], outer[run], down, top_bottom[0]) < 0.0:
                 continue
-            n = _outline(*body, o, k, z[run], outer[run], tolerance, corners)
+            n = _outline(*body, o, k, z[run], outer[run], top_bottom, tolerance, corners)
             m = convex_hull(corners, n, ring)
             while ends[made] + m > len(points):
                 points = np.concatenate((points, np.empty_like(points)))
             points[ends[made] : ends[made] + m] = ring[:m]
             ends[made + 1] = ends[made] + m
+            pair[made] = e, i
             made += 1 if m else 0
-    return points[: ends[made]].copy(), ends[: made + 1].copy()
+    return points[: ends[made]].copy(), ends[: made + 1].copy(), pair[:made].copy()

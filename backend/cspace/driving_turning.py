@@ -11,7 +11,7 @@ import numpy as np
 import shapely
 from numba import njit
 
-from backend.cspace.minkowski import MOST, Pieces, box_slices, convex_hull
+from backend.cspace.minkowski import MOST, Pieces, box_slices, convex_hull, solid_pieces
 from backend.spatial import rotation
 from backend.spatial.boxes import Boxes
 from backend.spatial.types import Array, IntArray
@@ -41,7 +41,7 @@ def turning_pieces(a: Boxes, b: Boxes, begin: float, end: float, tolerance: floa
     outlines = [shapely.get_coordinates(g)[:-1][::-1] for g in made]
     start = np.concatenate([[0], np.cumsum([len(o) for o in outlines])]).astype(np.int64)
     points = np.concatenate([*outlines, np.zeros((0, 2))])
-    return Pieces(points, start, np.zeros((0, 2)), np.zeros_like(start))
+    return solid_pieces(points, start)
 
 
 _Slices = tuple[Array, IntArray, dict[tuple[int, int], int]]

@@ -7,6 +7,7 @@ the root frame, so that a sloping base costs nothing. Images are bits, packed al
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import lru_cache
@@ -14,10 +15,9 @@ from functools import lru_cache
 import numpy as np
 
 from backend.cspace.exact_kernel import Chain, image_kernel
-from backend.cspace.exact_slices import EXACT, INNER, OUTER, Cells
+from backend.cspace.exact_levels import EXACT, INNER, OUTER, Axis, levels
 from backend.cspace.exact_upper import touching_swings
 from backend.cspace.planar_arm import PlanarArm, Profiles, planar_arm
-from backend.cspace.rows import Row
 from backend.machine.kinematics import body_boxes, link_poses
 from backend.machine.model import PARTS, Machine
 from backend.spatial import transform
@@ -25,10 +25,6 @@ from backend.spatial.boxes import Boxes
 from backend.spatial.types import AnyArray, Array, BoolArray, IntArray, frozen
 
 __all__ = ["EXACT", "INNER", "OUTER", "ArmModel", "JointGrid", "arm_model", "blocked", "joint_grid"]
-
-
-_CHUNKS = 12
-"""Pieces of an image that the threads share: enough to even out dear and cheap swings."""
 
 
 @dataclass(frozen=True)
@@ -85,22 +81,32 @@ def joint_grid(
 
 
 @dataclass(frozen=True)
+class SelfPart:
+    """Bodies of the machine that the first `held` joints carry, as obstacles to what is farther
+    out: where they stand at joint values 0, in the root frame, as built. pairs: (arm's bodies,
+    obstacles) that count.
+    """
+
+    held: int
+    obstacles: Boxes
+    pairs: BoolArray
+
+
+@dataclass(frozen=True)
 class ArmModel:
     """A machine prepared for the kernels, its bodies grown by `inflation` [m] on every side.
 
-    tracks, upper: (k,) body indices; boxes: all bodies at joint values 0 (tilt and rotate as they
-    are held) in the root frame, grown; as_built: the same, not grown. self_pairs: (n, n).
+    tracks, upper: bodies at joint values 0 (tilt and rotate as they are held) in the root frame,
+    grown; itself: what of the machine can touch itself.
     """
 
     machine: Machine
     inflation: float
     arm: PlanarArm
     chain: Chain
-    tracks: IntArray
-    upper: IntArray
-    boxes: Boxes
-    as_built: Boxes
-    self_pairs: BoolArray
+    tracks: Boxes
+    upper: Boxes
+    itself: tuple[SelfPart, ...]
 
 
 def arm_model(machine: Machine, rest: Array | None = None, inflation: float = 0.0) -> ArmModel:
@@ -119,10 +125,11 @@ def arm_model(machine: Machine, rest: Array | None = None, inflation: float = 0.
     pairs = np.zeros((len(part), len(part)), dtype=bool)
     for a, b in machine.self_pairs:
         pairs[a, b] = pairs[b, a] = True
+    links = np.array([0.0, np.hypot(*arm.boom), np.hypot(*arm.boom) + np.hypot(*arm.stick)])
+    far = [arm.outer.reach[arm.groups == k].max(initial=0.0) for k in range(3)]
     chain = Chain(
-        arm.pivot.copy(),
-        arm.boom.copy(),
-        arm.stick.copy(),
+        arm.pivots,
+        links + far,
         arm.boxes.centers.copy(),
         arm.boxes.rotations.copy(),
         arm.boxes.half_extents.copy(),
@@ -133,35 +140,57 @@ def arm_model(machine: Machine, rest: Array | None = None, inflation: float = 0.
         inflation=inflation,
         arm=arm,
         chain=chain,
-        tracks=np.flatnonzero(part == 0),
-        upper=np.flatnonzero(part == 1),
-        boxes=as_built.inflated(inflation),
-        as_built=as_built,
-        self_pairs=pairs,
+        tracks=as_built.take(part == 0).inflated(inflation),
+        upper=as_built.take(part == 1).inflated(inflation),
+        itself=tuple(_self_parts(arm, as_built, part, pairs)),
     )
 
 
-def blocked(model: ArmModel, grid: JointGrid, obstacles: Boxes, kind: int = EXACT) -> AnyArray:
+def _self_parts(
+    arm: PlanarArm, as_built: Boxes, part: IntArray, self_pairs: BoolArray
+) -> Iterator[SelfPart]:
+    """part: (bodies,) number along the chain; self_pairs: (bodies, bodies)."""
+    for held in range(5):
+        others = np.flatnonzero(part == held if held < 4 else part >= 4)
+        pairs = self_pairs[np.ix_(arm.bodies, others)]
+        # Each pair once, seen from the body that is farther out.
+        pairs = pairs & (arm.bodies[:, None] > others[None, :])
+        used = pairs.any(axis=0)
+        if used.any():
+            yield SelfPart(held, as_built.take(others[used]), np.ascontiguousarray(pairs[:, used]))
+
+
+def blocked(
+    model: ArmModel,
+    grid: JointGrid,
+    obstacles: Boxes,
+    kind: int = EXACT,
+    standing: bool = False,
+) -> AnyArray:
     """Which cells touch obstacles (in the root frame): uint64 (swing, boom, stick, words).
 
     kind: EXACT at the cells' centres; OUTER everything that is not certified free; INNER what is
-    certified to be blocked. The whole machine counts: where the tracks touch, all is blocked.
+    certified to be blocked. The whole machine counts: where the tracks touch, all is blocked,
+    unless they are `standing` on the obstacles.
     """
-    pairs = np.ones((len(model.boxes), len(obstacles)), dtype=bool)
-    base = np.zeros(grid.shape[0], dtype=bool)
-    if len(obstacles):
-        T = transform.inverse(model.arm.T_root_arm)
-        placed = _moved(T, obstacles)
-        still = touching_swings(
-            _moved(T, model.boxes.take(model.tracks)), placed, pairs[model.tracks], np.zeros(1),
-            kind=kind,
-        )  # fmt: skip
-        turning = touching_swings(
-            _moved(T, model.boxes.take(model.upper)), placed, pairs[model.upper],
-            model.arm.swing_sign * grid.centers(0), float(grid.steps[0]) / 2.0, kind,
-        )  # fmt: skip
-        base = still | turning
-    return _image(model, grid, obstacles, pairs[model.arm.bodies], base, kind)
+    if not len(obstacles):
+        return np.zeros((*grid.shape[:3], grid.words), dtype=np.uint64)
+    T = transform.inverse(model.arm.T_root_arm)
+    placed = obstacles.moved(T)
+
+    def all_pairs(bodies: Boxes) -> BoolArray:
+        return np.ones((len(bodies), len(obstacles)), dtype=bool)
+
+    base = touching_swings(
+        model.upper.moved(T), placed, all_pairs(model.upper),
+        model.arm.swing_sign * grid.centers(0), float(grid.steps[0]) / 2.0, kind,
+    )  # fmt: skip
+    if not standing:
+        base |= touching_swings(
+            model.tracks.moved(T), placed, all_pairs(model.tracks), np.zeros(1), kind=kind
+        )
+    pairs = np.ones((len(model.arm.bodies), len(obstacles)), dtype=bool)
+    return _image(model, grid, obstacles, pairs, base, kind)
 
 
 def self_blocked(
@@ -172,39 +201,24 @@ def self_blocked(
     The body farther out is grown by the model's inflation, the other is as built. slack: (4,) how
     far each joint may be from its value, which widens the cells of OUTER [rad].
     """
-    out = _self_part(model, grid, model.tracks, kind, slack)
-    out |= _self_part(model, _hold(grid, 0, 0.0), model.upper, kind, slack)
-    bodies, groups = model.arm.bodies, model.arm.groups
-    held = _hold(_hold(grid, 0, 0.0), 1, 0.0)
-    out |= _self_part(model, held, bodies[groups == 0], kind, slack)
-    held = _hold(held, 2, 0.0)
-    out |= _self_part(model, held, bodies[groups == 1], kind, slack)
-    held = _hold(held, 3, 0.0)
-    inside = _self_part(model, held, bodies[groups == 2], kind, slack)
-    if inside.any():
-        out[:] = _full_words(grid)
+    out = np.zeros((*grid.shape[:3], grid.words), dtype=np.uint64)
+    none = np.zeros(grid.shape[0], dtype=bool)
+    for part in model.itself:
+        found = _image(model, _held(grid, part.held), part.obstacles, part.pairs, none, kind, slack)
+        if part.held < 4:
+            out |= found
+        elif found.any():
+            out[:] = _full_words(grid)
     return out
 
 
-def _self_part(
-    model: ArmModel, grid: JointGrid, others: IntArray, kind: int, slack: Array | None
-) -> AnyArray:
-    """Bodies `others`, where they stand at joint values 0, as obstacles to what is farther out."""
-    bodies = model.arm.bodies
-    pairs = model.self_pairs[np.ix_(bodies, others)]
-    # Each pair once, seen from the body that is farther out.
-    pairs = pairs & (bodies[:, None] > others[None, :])
-    used = pairs.any(axis=0)
-    obstacles = model.as_built.take(others[used])
-    none = np.zeros(grid.shape[0], dtype=bool)
-    return _image(model, grid, obstacles, pairs[:, used], none, kind, slack)
-
-
-def _hold(grid: JointGrid, joint: int, value: float) -> JointGrid:
-    """The grid with one joint held: its one cell stands for all."""
-    lower, upper, shape = grid.lower.copy(), grid.upper.copy(), list(grid.shape)
-    lower[joint] = upper[joint] = value
-    shape[joint] = 1
+def _held(grid: JointGrid, count: int) -> JointGrid:
+    """The grid with the first `count` joints held at 0: their one cell stands for all."""
+    if count == 0:
+        return grid
+    lower, upper = grid.lower.copy(), grid.upper.copy()
+    lower[:count] = upper[:count] = 0.0
+    shape = (*([1] * count), *grid.shape[count:])
     return JointGrid(lower, upper, (shape[0], shape[1], shape[2], shape[3]))
 
 
@@ -220,32 +234,50 @@ def _image(
     out = np.zeros((*grid.shape[:3], grid.words), dtype=np.uint64)
     if not base.any() and not pairs.any():
         return out
-    T_arm_root = model.arm.T_arm_root(grid.centers(0))[:, :3, :].copy()
-    signs = model.arm.signs
-    rows = [
-        Row(float(signs[k] * grid.centers(k + 1)[0]), float(signs[k] * _step(grid, k + 1)), n)
-        for k, n in enumerate(grid.shape[1:])
-    ]
     halves = np.zeros(4) if kind == EXACT else grid.steps / 2.0
     if kind == OUTER and slack is not None:
         halves = halves + slack
+    boom, stick, bucket = levels(model.arm, _axes(model, grid, halves), kind)
     body: Profiles = model.arm.inner if kind == INNER else model.arm.outer
     arguments = (
         model.chain,
         body,
         (obstacles.centers.copy(), obstacles.rotations.copy(), obstacles.half_extents.copy()),
         np.ascontiguousarray(pairs),
-        T_arm_root,
-        Cells(rows[0], rows[1], rows[2], kind, halves),
+        model.arm.T_arm_root(grid.centers(0))[:, :3, :].copy(),
+        boom,
+        stick,
+        bucket,
+        kind,
+        float(halves[0]),
         base,
     )
-    cuts = np.linspace(0, grid.shape[0], min(grid.shape[0], _CHUNKS) + 1).astype(int)
-    spans = list(zip(cuts[:-1].tolist(), cuts[1:].tolist(), strict=True))
-    if len(spans) < _CHUNKS:
-        image_kernel(*arguments, 0, grid.shape[0], out)
-    else:
-        list(_pool().map(lambda span: image_kernel(*arguments, *span, out), spans))
+    rows = out.reshape(grid.shape[0], -1, grid.words)
+    # Swings side by side cost about the same: each thread takes every so many.
+    every = min(os.cpu_count() or 1, grid.shape[0])
+
+    def fill(first: int) -> None:
+        image_kernel(*arguments, first, every, rows)
+
+    others = [_pool().submit(fill, first) for first in range(1, every)]
+    fill(0)
+    for other in others:
+        other.result()
     return out
+
+
+def _axes(model: ArmModel, grid: JointGrid, halves: Array) -> tuple[Axis, Axis, Axis]:
+    """Cells of boom, stick and bucket as angles in the arm's plane. halves: (4,) [rad]."""
+    boom, stick, bucket = (
+        Axis(
+            float(sign * grid.centers(k)[0]),
+            float(sign * _step(grid, k)),
+            grid.shape[k],
+            float(halves[k]),
+        )
+        for k, sign in enumerate(model.arm.signs, start=1)
+    )
+    return boom, stick, bucket
 
 
 @lru_cache(maxsize=1)
@@ -262,11 +294,6 @@ def _full_words(grid: JointGrid) -> AnyArray:
     bits = np.zeros(64 * grid.words, dtype=bool)
     bits[: grid.shape[3]] = True
     return np.packbits(bits, bitorder="little").view(np.uint64)
-
-
-def _moved(T: Array, boxes: Boxes) -> Boxes:
-    """Boxes in another frame. T: (4, 4)."""
-    return Boxes(transform.apply(T, boxes.centers), T[:3, :3] @ boxes.rotations, boxes.half_extents)
 
 
 def unpacked(bits: AnyArray, cells: int) -> BoolArray:

@@ -23,10 +23,13 @@ def _hits(
     links: IntArray,
     others: tuple[Array, Array, Array],
     self_pairs: IntArray,
+    counts: BoolArray,
     against: BoolArray,
     itself: BoolArray,
 ) -> None:
-    """T: (k, L, 4, 4); own in the links' frames, others in the root frame; sets against, itself."""
+    """T: (k, L, 4, 4); own in the links' frames, others in the root frame; counts: (n,) own bodies
+    that others matter to; sets against, itself.
+    """
     n, m = len(links), len(others[0])
     centers, rotations = np.empty((n, 3)), np.empty((n, 3, 3))
     size, other_size = np.empty(n), np.empty(m)
@@ -47,7 +50,7 @@ def _hits(
                     rotations[i, a, b] = total
         for i in range(n):
             for j in range(m):
-                if against[c]:
+                if against[c] or not counts[i]:
                     break
                 d = 0.0
                 for a in range(3):
@@ -74,14 +77,22 @@ def _hits(
                 break
 
 
-def touching(machine: Machine, q: Array, obstacles: Boxes) -> tuple[BoolArray, BoolArray]:
+def touching(
+    machine: Machine,
+    q: Array,
+    obstacles: Boxes,
+    standing: bool = False,
+    ask_itself: bool = True,
+) -> tuple[BoolArray, BoolArray]:
     """(touches an obstacle, touches itself), each (k,), at q (k, n) [rad]; bodies as built.
 
-    obstacles in the machine's root frame.
+    obstacles in the machine's root frame; standing: the tracks stand on them, which does not count;
+    ask_itself: False leaves the second answer at False.
     """
     q = np.asarray(q, dtype=float)
     against, itself = np.zeros(len(q), dtype=bool), np.zeros(len(q), dtype=bool)
-    pairs = np.array(machine.self_pairs, dtype=np.int64).reshape(-1, 2)
+    itself_pairs = machine.self_pairs if ask_itself else ()
+    pairs = np.array(itself_pairs, dtype=np.int64).reshape(-1, 2)
     own = (
         machine.bodies.centers.copy(),
         machine.bodies.rotations.copy(),
@@ -92,8 +103,9 @@ def touching(machine: Machine, q: Array, obstacles: Boxes) -> tuple[BoolArray, B
         obstacles.rotations.copy(),
         obstacles.half_extents.copy(),
     )
+    counts = machine.body_joints.any(axis=1) | (not standing)
     for start in range(0, len(q), _BATCH):
         part = slice(start, start + _BATCH)
         T = link_poses(machine, q[part])
-        _hits(T, own, machine.body_link_index, others, pairs, against[part], itself[part])
+        _hits(T, own, machine.body_link_index, others, pairs, counts, against[part], itself[part])
     return against, itself

@@ -3,34 +3,15 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
+from backend.cspace.exact_levels import INNER, OUTER, ROUNDING
 from backend.cspace.planar_arm import Profiles
-from backend.cspace.planar_slices import POINTS, inner_slice, outer_slice
-from backend.cspace.rows import Polygons, Row
+from backend.cspace.planar_slices import POINTS, inner_slice, outer_slice, slab_slice
+from backend.cspace.rows import Polygons, rectangle_distance
 from backend.spatial.types import Array, BoolArray
-
-EXACT, OUTER, INNER = 0, 1, -1
-ROUNDING = 1e-9
-"""[m], [rad]: certified bounds are moved outward by more than the kernels round."""
-
-
-class Cells(NamedTuple):
-    """The grid. boom, stick, bucket: rows of cell centres in the arm's plane.
-
-    kind: EXACT at the centres; OUTER all that is not surely free; INNER only what is surely
-    blocked; halves: (4,) half a cell of swing, boom, stick, bucket [rad], 0 where the value is
-    exact.
-    """
-
-    boom: Row
-    stick: Row
-    bucket: Row
-    kind: int
-    halves: Array
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
@@ -56,41 +37,48 @@ def slices(
     kind: int,
     spread: float,
     pivot: Array,
-    reach: float,
+    reach: Array,
 ) -> Polygons:
-    """Polygons of all obstacles that the arm can meet, for every slab that needs them."""
+    """Polygons of all obstacles that the arm can meet, for every slab that needs them.
+
+    spread: half a cell of the swing [rad]; pivot: (2,) of the boom; reach: (3,) of the bodies of
+    boom, stick and bucket from there [m].
+    """
     centers, rotations, halves = boxes
     m, slabs = len(centers), len(body.slabs)
     pad = ROUNDING * kind
     wide = max(abs(body.slabs.min()), abs(body.slabs.max())) + abs(pad)
-    wanted = np.zeros((slabs, m), np.bool_)
+    wanted = np.zeros((slabs, m))  # how far from the pivot a slice matters
     for j in range(m):
         size = math.sqrt(halves[j, 0] ** 2 + halves[j, 1] ** 2 + halves[j, 2] ** 2) + 1e-6
         x, t, z = centers[j, 0], centers[j, 1], centers[j, 2]
         beside = abs(t) * math.cos(spread) - abs(x) * math.sin(spread) - size
-        # The swing moves a point on a circle about z: its distance from the pivot is at least
-        # that of the nearest point of the circle.
+        # Within the cell the swing moves a point on a circle about z.
         away = math.hypot(max(abs(math.hypot(x, t) - abs(pivot[0])) - wide, 0.0), z - pivot[1])
-        if beside > wide or away - size > reach + wide:
+        if spread == 0.0:
+            away = math.hypot(x - pivot[0], z - pivot[1]) - wide
+        if beside > wide:
             continue
         for b in range(len(body.group)):
-            if body.sides[b] > 0 and pairs[b, j]:
-                wanted[body.slab[b], j] = True
+            within = reach[body.group[b]]
+            if body.sides[b] > 0 and pairs[b, j] and away - size <= within + wide:
+                wanted[body.slab[b], j] = max(wanted[body.slab[b], j], within)
     room = 0
     for s in range(slabs):
         for j in range(m):
-            if wanted[s, j]:
+            if wanted[s, j] > 0.0:
                 room += 2 if kind == OUTER and spread > 0.0 else 1
     slab, obstacle = np.empty(room, np.int64), np.empty(room, np.int64)
     count = np.zeros(room, np.int64)
     xs, zs = np.empty((room, POINTS)), np.empty((room, POINTS))
     corners, work = np.empty((8, 3)), np.empty((2, 12, 3))
-    points = np.empty((POINTS, 3))
+    points, flat = np.empty((POINTS, 3)), np.empty((2, POINTS))
+    low_corner, high_corner = np.empty((room, 2)), np.empty((room, 2))
     k = 0
     for j in range(m):
         made = False
         for s in range(slabs):
-            if not wanted[s, j]:
+            if wanted[s, j] == 0.0:
                 continue
             if not made:
                 made = True
@@ -101,29 +89,32 @@ def slices(
                             half = halves[j, a] if (v >> a) & 1 else -halves[j, a]
                             corners[v, i] += half * rotations[j, i, a]
             low, high = body.slabs[s, 0] - pad, body.slabs[s, 1] + pad
-            if kind == INNER and spread > 0.0:
-                n = inner_slice(corners, low, high, spread, points, work, xs[k], zs[k])
-                if n >= 3:
-                    slab[k], obstacle[k], count[k] = s, j, n
-                    k += 1
-                continue
-            for front in (True, False):
-                n = outer_slice(corners, low, high, spread, front, points, work, xs[k], zs[k])
-                if n > 0:
-                    slab[k], obstacle[k], count[k] = s, j, n
-                    k += 1
+            for part in range(2 if kind == OUTER and spread > 0.0 else 1):
                 if spread == 0.0:
-                    break
+                    n = slab_slice(corners, low, high, flat, xs[k], zs[k])
+                elif kind == INNER:
+                    n = inner_slice(corners, low, high, spread, points, work, xs[k], zs[k])
+                    n = n if n >= 3 else 0
+                else:
+                    n = outer_slice(
+                        corners, low, high, spread, part == 0, points, work, xs[k], zs[k]
+                    )
+                if n == 0:
+                    continue
+                low_corner[k, 0], high_corner[k, 0] = xs[k, :n].min(), xs[k, :n].max()
+                low_corner[k, 1], high_corner[k, 1] = zs[k, :n].min(), zs[k, :n].max()
+                near = rectangle_distance(low_corner[k], high_corner[k], pivot[0], pivot[1])
+                if near <= wanted[s, j] ** 2:
+                    slab[k], obstacle[k], count[k] = s, j, n
+                    k += 1
     widest = 1
     for i in range(k):
         widest = max(widest, count[i])
     normal_x, normal_z = np.zeros((k, widest)), np.zeros((k, widest))
     angle = np.zeros((k, widest))
-    offset, low_corner, high_corner = np.zeros((k, widest)), np.empty((k, 2)), np.empty((k, 2))
+    offset = np.zeros((k, widest))
     for i in range(k):
         n = count[i]
-        low_corner[i, 0], high_corner[i, 0] = xs[i, :n].min(), xs[i, :n].max()
-        low_corner[i, 1], high_corner[i, 1] = zs[i, :n].min(), zs[i, :n].max()
         for v in range(n):
             u = v + 1 if v + 1 < n else 0
             dx, dz = xs[i, u] - xs[i, v], zs[i, u] - zs[i, v]
@@ -139,5 +130,5 @@ def slices(
                 offset[i, v] = max(offset[i, v], reached)
     return Polygons(
         slab[:k], obstacle[:k], count[:k], xs[:k, :widest].copy(), zs[:k, :widest].copy(),
-        normal_x, normal_z, offset, angle, low_corner, high_corner,
+        normal_x, normal_z, offset, angle, low_corner[:k], high_corner[:k],
     )  # fmt: skip

@@ -18,13 +18,26 @@ _PAD = 1e-9
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _turned_gap(
-    center: Array, R: Array, half: Array, c: Array, Q: Array, h: Array, angle: float, enough: float
+    center: Array,
+    R: Array,
+    half: Array,
+    c: Array,
+    Q: Array,
+    h: Array,
+    cos: float,
+    sin: float,
+    enough: float,
 ) -> float:
-    """`gap` of a box turned about z by `angle` from an obstacle (c, Q, h)."""
-    cos, sin = math.cos(angle), math.sin(angle)
+    """`gap` of a box turned about z from an obstacle (c, Q, h), or a lower bound above `enough`."""
+    x, y = cos * center[0] - sin * center[1], sin * center[0] + cos * center[1]
+    dx, dy, dz = x - c[0], y - c[1], center[2] - c[2]
+    spheres = math.sqrt(half[0] ** 2 + half[1] ** 2 + half[2] ** 2) + enough
+    spheres += math.sqrt(h[0] ** 2 + h[1] ** 2 + h[2] ** 2)
+    apart = dx * dx + dy * dy + dz * dz
+    if apart > spheres * spheres:
+        return math.sqrt(apart) - spheres + enough
     at, turned = np.empty(3), np.empty((3, 3))
-    at[0], at[1] = cos * center[0] - sin * center[1], sin * center[0] + cos * center[1]
-    at[2] = center[2]
+    at[0], at[1], at[2] = x, y, center[2]
     for k in range(3):
         turned[0, k] = cos * R[0, k] - sin * R[1, k]
         turned[1, k] = sin * R[0, k] + cos * R[1, k]
@@ -55,6 +68,7 @@ def _decide(
         # No point of a body moves farther than its radius times this within the part.
         chord = 2.0 * math.sin(0.5 * min(half, math.pi))
         sure, maybe = False, False
+        cos, sin = math.cos(middle), math.sin(middle)
         for i in range(len(own[0])):
             moved = radius[i] * chord + _PAD
             for j in range(len(others[0])):
@@ -62,7 +76,7 @@ def _decide(
                     continue
                 g = _turned_gap(
                     own[0][i], own[1][i], own[2][i], others[0][j], others[1][j], others[2][j],
-                    middle, moved,
+                    cos, sin, moved,
                 )  # fmt: skip
                 sure = sure or g < -moved
                 maybe = maybe or g <= moved
@@ -96,12 +110,13 @@ def _states(
         if kind != 0:
             out[s] = _decide(own, others, pairs, radius, angles[s], half_cell, kind < 0, depth)
             continue
+        cos, sin = math.cos(angles[s]), math.sin(angles[s])
         for i in range(len(own[0])):
             for j in range(len(others[0])):
                 if pairs[i, j] and not out[s]:
                     g = _turned_gap(
                         own[0][i], own[1][i], own[2][i], others[0][j], others[1][j], others[2][j],
-                        angles[s], 0.0,
+                        cos, sin, 0.0,
                     )  # fmt: skip
                     out[s] = g <= 0.0
     return out

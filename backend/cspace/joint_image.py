@@ -20,12 +20,15 @@ from backend.cspace.exact import (
     self_blocked,
     unpacked,
 )
+from backend.cspace.ground import GROUND
 from backend.machine.model import Machine
 from backend.spatial.boxes import Boxes
 from backend.spatial.types import AnyArray, Array, BoolArray
 
 SELF = "self"
-"""The layer of self-collision; the other layers are named by the caller ("partner", "site")."""
+"""The layer of self-collision; the other layers are named by the caller ("partner", "site").
+
+The layer "ground" is what the machine stands on: it does not count for the tracks."""
 
 SHAPE = (72, 64, 64, 64)
 
@@ -115,14 +118,17 @@ def certified4(
     shape: tuple[int, int, int, int] = SHAPE,
     rest: Array | None = None,
     own: tuple[AnyArray, AnyArray] | None = None,
+    slack: Array | None = None,
 ) -> CertifiedImage:
     """The certified image over swing, boom, stick and bucket.
 
     eta: how much the machine's bodies are grown for "free", for its own and the obstacles'
-    uncertainty together [m]; own: `open` and `blocked` of the layer "self" of an earlier image of
-    the same shape and eta. Otherwise as `joint4`.
+    uncertainty together [m]; slack: (n,) what each joint may be wrong by, which is all that matters
+    between the machine's own bodies; without it they are grown by eta [rad]; own: `open` and
+    `blocked` of the layer "self" of an earlier image of the same shape, eta and slack. Otherwise as
+    `joint4`.
     """
-    return _certified(machine, joint_grid(machine, shape), layers, eta, rest, own)
+    return _certified(machine, joint_grid(machine, shape), layers, eta, rest, own, slack)
 
 
 def certified3(
@@ -131,9 +137,10 @@ def certified3(
     eta: float,
     q: Array,
     shape: tuple[int, int, int] = (64, 64, 64),
+    slack: Array | None = None,
 ) -> CertifiedImage:
     """The certified image at the swing of q (n,) [rad], which is taken to be exact."""
-    return _certified(machine, at_swing(machine, q, shape), layers, eta, q, None)
+    return _certified(machine, at_swing(machine, q, shape), layers, eta, q, None, slack)
 
 
 def at_swing(machine: Machine, q: Array, shape: tuple[int, int, int]) -> JointGrid:
@@ -145,7 +152,9 @@ def _exact(
     model: ArmModel, grid: JointGrid, layers: Mapping[str, Boxes], own: AnyArray | None
 ) -> JointImage:
     _check(layers)
-    images = {name: blocked(model, grid, boxes, EXACT) for name, boxes in layers.items()}
+    images = {
+        name: blocked(model, grid, boxes, EXACT, name == GROUND) for name, boxes in layers.items()
+    }
     images[SELF] = self_blocked(model, grid, EXACT) if own is None else own
     return JointImage(grid, images)
 
@@ -157,14 +166,25 @@ def _certified(
     eta: float,
     rest: Array | None,
     own: tuple[AnyArray, AnyArray] | None,
+    slack: Array | None,
 ) -> CertifiedImage:
     _check(layers)
     as_built = arm_model(machine, rest)
     grown = arm_model(machine, rest, eta)
-    outer = {name: blocked(grown, grid, boxes, OUTER) for name, boxes in layers.items()}
-    inner = {name: blocked(as_built, grid, boxes, INNER) for name, boxes in layers.items()}
+    outer = {
+        name: blocked(grown, grid, boxes, OUTER, name == GROUND) for name, boxes in layers.items()
+    }
+    inner = {
+        name: blocked(as_built, grid, boxes, INNER, name == GROUND)
+        for name, boxes in layers.items()
+    }
     if own is None:
-        own = (self_blocked(grown, grid, OUTER), self_blocked(as_built, grid, INNER))
+        own = (
+            self_blocked(grown, grid, OUTER)
+            if slack is None
+            else self_blocked(as_built, grid, OUTER, np.asarray(slack, dtype=float)[:4]),
+            self_blocked(as_built, grid, INNER),
+        )
     outer[SELF], inner[SELF] = own
     return CertifiedImage(grid, eta, outer, inner)
 

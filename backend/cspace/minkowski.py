@@ -12,16 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 from numba import njit
-from shapely.geometry.base import BaseGeometry
 
 from backend.spatial.boxes import Boxes
-from backend.spatial.types import Array, BoolArray, IntArray
+from backend.spatial.types import Array, IntArray
 
 MOST = 64
 """Room for the vertices of one slice: the difference of two boxes has at most 30 faces."""
-
-_SPECK = 1e-6
-"""A free place smaller than this counts as taken: rounding of the overlay can make such [m^2]."""
 
 
 def box_slices(a: Boxes, b: Boxes) -> tuple[Array, IntArray, IntArray]:
@@ -49,93 +45,52 @@ def polygons(points: Array, start: IntArray) -> list[shapely.Polygon]:
     return made
 
 
-def union(pieces: list[shapely.Polygon]) -> BaseGeometry:
-    """The union as a Polygon or MultiPolygon; an empty Polygon for no pieces."""
-    return shapely.union_all(pieces) if pieces else shapely.Polygon()
-
-
 @dataclass(frozen=True)
 class Pieces:
-    """Convex polygons, some with a convex hole, stored one after the other; see `box_slices`.
+    """Convex polygons, some with holes, stored one after the other; see `box_slices`.
 
-    points: (k, 2) [m], start: (p + 1,); holes: (h, 2) [m], hole_start: (p + 1,), equal neighbours
-    where a piece has no hole.
+    points: (k, 2) [m], start: (p + 1,); holes: (m, 2) [m], hole_start: (h + 1,), owner: (h,) the
+    piece of each hole, ascending; simple polygons. A hole may reach beyond its piece;
+    a piece may have several.
     """
 
     points: Array
     start: IntArray
     holes: Array
     hole_start: IntArray
+    owner: IntArray
+
+    def __len__(self) -> int:
+        return len(self.start) - 1
+
+
+def solid_pieces(points: Array, start: IntArray) -> Pieces:
+    """Pieces without holes: points (k, 2) [m], start (p + 1,)."""
+    none = np.zeros(0, dtype=np.int64)
+    return Pieces(points, start, np.zeros((0, 2)), np.zeros(1, dtype=np.int64), none)
 
 
 def slice_pieces(a: Boxes, b: Boxes) -> Pieces:
     """`box_slices` as pieces without holes."""
     points, start, _ = box_slices(a, b)
-    return Pieces(points, start, np.zeros((0, 2)), np.zeros_like(start))
+    return solid_pieces(points, start)
 
 
 def joined_pieces(parts: list[Pieces]) -> Pieces:
     """All pieces of several lists."""
 
-    def ends(name: str) -> IntArray:
-        counts = [np.diff(getattr(p, name)) for p in parts]
-        return np.concatenate([[0], np.cumsum(np.concatenate(counts))]).astype(np.int64)
+    def ends(starts: list[IntArray]) -> IntArray:
+        counts = np.concatenate([np.diff(s) for s in starts])
+        return np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
 
+    first = np.cumsum([0, *(len(p) for p in parts)])
     return Pieces(
         np.concatenate([p.points for p in parts]),
-        ends("start"),
+        ends([p.start for p in parts]),
         np.concatenate([p.holes for p in parts]),
-        ends("hole_start"),
+        ends([p.hole_start for p in parts]),
+        np.concatenate([p.owner + n for p, n in zip(parts, first[:-1], strict=True)]),
     )
-
-
-def cover(pieces: Pieces) -> BaseGeometry:
-    """The union of all pieces.
-
-    Few outlines matter, those that lie in no other one. A free place within their union lies in
-    the holes of these few; what the pieces near it leave of it is cut out again.
-    """
-    if len(pieces.start) < 2:
-        return shapely.Polygon()
-    every = np.array(polygons(pieces.points, pieces.start), dtype=object)
-    outer = outermost(pieces.points, pieces.start, np.ones(len(every), dtype=np.bool_))
-    outline = union(list(every[outer]))
-    has = np.diff(pieces.hole_start) > 0
-    if not (outer & has).any():
-        return outline
-    filled = pieces.hole_start[np.append(True, has)]
-    hole = np.full(len(every), None, dtype=object)
-    hole[has] = polygons(pieces.holes, np.unique(filled))
-    free = union(list(hole[outer & has]))
-    # Largest first, solid before hollow: most free places are gone after a few.
-    for k in np.lexsort((-shapely.area(every), has)):
-        if free.is_empty:
-            return outline
-        if not shapely.intersects(every[k], free):
-            continue
-        free = (
-            shapely.difference(free, every[k])
-            if not has[k]
-            else shapely.union(
-                shapely.difference(free, every[k]), shapely.intersection(free, hole[k])
-            )
-        )
-    parts = [g for g in shapely.get_parts(free) if g.geom_type == "Polygon" and g.area > _SPECK]
-    return shapely.difference(outline, union(parts)) if parts else outline
-
-
-def outermost(points: Array, start: IntArray, solid: BoolArray) -> BoolArray:
-    """False for polygons that lie in another one, which can be left out of a union.
-
-    points, start: convex counter-clockwise polygons as of `box_slices`; solid: (p,) whether a
-    polygon covers all of its inside (only such ones make others superfluous).
-    """
-    if len(start) < 2:
-        return np.zeros(0, dtype=np.bool_)
-    low = np.minimum.reduceat(points, start[:-1])
-    high = np.maximum.reduceat(points, start[:-1])
-    order = np.argsort(-np.prod(high - low, axis=1), kind="stable")
-    return np.asarray(_outermost(points, start, solid, low, high, order))
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
@@ -225,56 +180,3 @@ def _box_slices(
                 start[made + 1] = start[made] + size
                 made += 1
     return points[: start[made]].copy(), start[: made + 1].copy(), index[:made].copy()
-
-
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _inside(points: Array, first: int, last: int, x: float, y: float) -> bool:
-    """Whether (x, y) lies in the convex polygon points[first:last]: bisection of its fan."""
-    ox, oy = points[first, 0], points[first, 1]
-    dx, dy = x - ox, y - oy
-    low, high = first + 1, last - 1
-    if (points[low, 0] - ox) * dy - (points[low, 1] - oy) * dx < 0.0:
-        return False
-    if (points[high, 0] - ox) * dy - (points[high, 1] - oy) * dx > 0.0:
-        return False
-    while high - low > 1:
-        middle = (low + high) // 2
-        if (points[middle, 0] - ox) * dy - (points[middle, 1] - oy) * dx >= 0.0:
-            low = middle
-        else:
-            high = middle
-    ex, ey = points[high, 0] - points[low, 0], points[high, 1] - points[low, 1]
-    return bool(ex * (y - points[low, 1]) - ey * (x - points[low, 0]) >= 0.0)
-
-
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _outermost(
-    points: Array, start: IntArray, solid: BoolArray, low: Array, high: Array, order: IntArray
-) -> BoolArray:
-    keep = np.zeros(len(order), np.bool_)
-    containers = np.empty(len(order), np.int64)
-    count = 0
-    for p in order:
-        hidden = False
-        for c in range(count):
-            q = containers[c]
-            if (
-                low[p, 0] < low[q, 0]
-                or low[p, 1] < low[q, 1]
-                or high[p, 0] > high[q, 0]
-                or high[p, 1] > high[q, 1]
-            ):
-                continue
-            hidden = True
-            for v in range(start[p], start[p + 1]):
-                if not _inside(points, start[q], start[q + 1], points[v, 0], points[v, 1]):
-                    hidden = False
-                    break
-            if hidden:
-                break
-        if not hidden:
-            keep[p] = True
-            if solid[p]:
-                containers[count] = p
-                count += 1
-    return keep

@@ -109,6 +109,35 @@ def slab_planes(low: float, high: float, spread: float, front: bool) -> Array:
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def slab_slice(
+    corners: Array, low: float, high: float, work: Array, out_x: Array, out_z: Array
+) -> int:
+    """Polygon of a box (8, 3) in the slab low <= t <= high; its number of corners.
+
+    Bit a of a corner's number is the side of the box's axis a that it is on.
+    """
+    x, z = work[0], work[1]
+    n = 0
+    for v in range(8):
+        t = corners[v, 1]
+        if low <= t <= high:
+            x[n], z[n] = corners[v, 0], corners[v, 2]
+            n += 1
+        for a in range(3):
+            u = v | 1 << a
+            if u == v:
+                continue
+            rise = corners[u, 1] - t
+            for plane in (low, high):
+                if (t < plane < corners[u, 1]) or (corners[u, 1] < plane < t):
+                    share = (plane - t) / rise
+                    x[n] = corners[v, 0] + share * (corners[u, 0] - corners[v, 0])
+                    z[n] = corners[v, 2] + share * (corners[u, 2] - corners[v, 2])
+                    n += 1
+    return int(convex_hull(x, z, n, out_x, out_z)) if n > 0 else 0
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def outer_slice(
     corners: Array,
     low: float,

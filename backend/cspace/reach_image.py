@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
 
 from backend.cspace.exact_points import touching
+from backend.cspace.ground import GROUND
 from backend.machine import inverse
 from backend.machine.kinematics import end_point
 from backend.machine.model import Machine
 from backend.machine.sun_map import sun_angles
 from backend.spatial import transform
-from backend.spatial.boxes import Boxes
-from backend.spatial.types import AnyArray, Array
+from backend.spatial.boxes import NO_BOXES, Boxes
+from backend.spatial.types import AnyArray, Array, BoolArray
+
+SELF = "self"
+
+NEAR = np.deg2rad(5.0)
+"""A joint this close to its limit counts as near it [rad]."""
 
 
 class ReachState(IntEnum):
@@ -30,9 +37,10 @@ class ReachState(IntEnum):
 class ReachImage:
     """swing: (s,) joint values [rad]; reach: (r,) of the tip from the swing axis [m], cell centres.
 
-    state: (s, r) ReachState as uint8; against, itself: (s, r) whether a colliding cell touches an
-    obstacle, or the machine itself; height: of the tip above the swing joint's origin, along the
-    swing axis [m]; attitude: of the bucket [rad]; elbow: +1 up, -1 down.
+    state: (s, r) ReachState as uint8; layers: name -> (s, r) whether a colliding cell touches it,
+    "self" among them; near_limit: (s, r) a joint is within NEAR of its limit, or beyond; height: of
+    the tip above the swing joint's origin, along the swing axis [m]; attitude: of the bucket [rad];
+    elbow: +1 up, -1 down.
     """
 
     swing: Array
@@ -40,8 +48,8 @@ class ReachImage:
     swing_edges: Array
     reach_edges: Array
     state: AnyArray
-    against: AnyArray
-    itself: AnyArray
+    layers: dict[str, BoolArray]
+    near_limit: BoolArray
     height: float
     attitude: float
     elbow: int
@@ -50,16 +58,16 @@ class ReachImage:
 def reach_image(
     machine: Machine,
     q: Array,
-    obstacles: Boxes,
+    layers: Mapping[str, Boxes],
     shape: tuple[int, int] = (90, 60),
     height: float | None = None,
 ) -> ReachImage:
     """Every cell's configuration has the tip at q's height and the bucket at q's attitude.
 
-    q: (n,) present joint values [rad]; obstacles in the machine's root frame; height of the tip
-    above the swing joint's origin, along the swing axis [m], the present one when None. The elbow
-    stays on its present side. Swing covers the joint's range, a full turn when continuous; reach 0
-    to the machine's largest.
+    q: (n,) present joint values [rad]; layers: obstacles in the machine's root frame, by layer;
+    height of the tip above the swing joint's origin, along the swing axis [m], the present one when
+    None. The elbow stays on its present side. Swing covers the joint's range, a full turn when
+    continuous; reach 0 to the machine's largest.
     """
     q = np.asarray(q, dtype=float)
     joint = machine.joints[0]
@@ -93,13 +101,16 @@ def reach_image(
 
     state = np.full(S.shape, ReachState.FREE, dtype=np.uint8)
     joints = configurations[..., 1:]
-    kept = (joints >= machine.lower[1:] - 1e-9) & (joints <= machine.upper[1:] + 1e-9)
-    state[~kept.all(axis=-1)] = ReachState.BEYOND_LIMIT
+    slack = np.minimum(joints - machine.lower[1:], machine.upper[1:] - joints).min(axis=-1)
+    state[~(slack >= -1e-9)] = ReachState.BEYOND_LIMIT
     state[~solution.reachable] = ReachState.OUT_OF_REACH
     asked = state == ReachState.FREE
-    against, itself = np.zeros(S.shape, dtype=bool), np.zeros(S.shape, dtype=bool)
-    against[asked], itself[asked] = touching(machine, configurations[asked], obstacles)
-    state[against | itself] = ReachState.COLLIDING
-    return ReachImage(
-        swing, reach, swing_edges, reach_edges, state, against, itself, z, attitude, elbow
-    )
+    hit = {name: np.zeros(S.shape, dtype=bool) for name in (*layers, SELF)}
+    for name, boxes in (*layers.items(), (SELF, NO_BOXES)):
+        against, itself = touching(
+            machine, configurations[asked], boxes, name == GROUND, name == SELF
+        )
+        hit[name][asked] = itself if name == SELF else against
+    state[np.any(list(hit.values()), axis=0)] = ReachState.COLLIDING
+    near = solution.reachable & (slack < NEAR)
+    return ReachImage(swing, reach, swing_edges, reach_edges, state, hit, near, z, attitude, elbow)

@@ -37,10 +37,7 @@ def bearing(x: float, z: float, exact: bool) -> float:
     if exact:
         return math.atan2(z, x)
     a, b = abs(x), abs(z)
-    big, small = max(a, b), min(a, b)
-    if big == 0.0:
-        return 0.0
-    t = small / big
+    t = min(a, b) / max(a, b, 5e-324)
     u = t * t
     p = 0.010962443101616624 - 0.0018044901736224805 * u
     p = -0.031264506455191694 + u * p

@@ -10,21 +10,20 @@ import numpy as np
 from backend.collision.closest import ClosePairs, all_pairs, closest_pairs
 from backend.cspace.sun_images import sun_image
 from backend.cspace.sun_pose import sun_pose
+from backend.documents.driving import driving_document
+from backend.documents.margins import margins_document
+from backend.documents.scene import make_scene
 from backend.documents.state import (
-    MachineStateDocument,
     StateDocument,
-    joint_vector,
-    velocity_vector,
 )
 from backend.documents.sun import sun_state_document
-from backend.errors import InputError
 from backend.fusion.crs import SiteFrame
-from backend.fusion.pose import FusedPose, Validity
-from backend.fusion.samples import Fix
+from backend.fusion.pose import FusedPose
 from backend.machine.model import Machine
 from backend.pipeline.images import SunParameters, pair_key
-from backend.pipeline.place import base_transform, place
+from backend.pipeline.place import base_transform
 from backend.pipeline.records import Body3D
+from backend.site.bodies import NO_SITE_BODIES, SiteBodies
 from backend.spatial.boxes import Boxes
 from backend.spatial.types import Array
 
@@ -36,21 +35,18 @@ def assess(
     sun: SunParameters,
     every_pair: bool = False,
     where: str = "state",
+    ground: bool = False,
+    site: SiteBodies = NO_SITE_BODIES,
 ) -> dict[str, Any]:
-    """Bodies, end-points, closest distances and Sun's sets of one state document.
+    """Bodies, end-points, closest distances, Sun's sets, zones and margins of one state document.
 
-    machines: the description of every machine of the document. Coordinates of the result are in
-    the frame of the document's positions [m]; distances are of bodies as built. Raises InputError.
+    machines: the description of every machine of the document; ground: whether it counts as an
+    obstacle to margins; site: what stands on the site besides the document's obstacles. Coordinates
+    of the result are in the frame of the document's positions [m]; distances are of bodies as
+    built. Raises InputError.
     """
-    origin = _origin(state, frame)
-    poses = {
-        name: _pose(name, document, machines[name], state.time, origin, where)
-        for name, document in state.machines.items()
-    }
-    placed = {
-        name: place(machines[name], pose.joints, base_transform(pose))
-        for name, pose in poses.items()
-    }
+    scene = make_scene(state, machines, frame, where, site)
+    origin, poses, placed = scene.origin, scene.poses, scene.placed
     return {
         "time": state.time,
         "frame": state.frame,
@@ -61,55 +57,15 @@ def assess(
             pair_key(own, partner): _sun(machines, poses, own, partner, sun, origin)
             for own, partner in permutations(poses, 2)
         },
-    }
-
-
-def _origin(state: StateDocument, frame: SiteFrame | None) -> Array:
-    """What is subtracted from the document's positions, so that arithmetic is on small numbers."""
-    if state.frame == "site":
-        return np.zeros(3)
-    if frame is not None:
-        return np.array(frame.origin)
-    first = next(iter(state.machines.values()))
-    return np.array([np.floor(first.position[0]), np.floor(first.position[1]), 0.0])
-
-
-def _pose(
-    name: str,
-    document: MachineStateDocument,
-    machine: Machine,
-    time: float,
-    origin: Array,
-    where: str,
-) -> FusedPose:
-    field = f"{where}: machines.{name}"
-    position = np.array(document.position) - origin
-    if float(np.abs(position).max()) > 1e6:
-        raise InputError(
-            f"{field}.position is {list(document.position)}; allowed is within 1000 km of the "
-            "site's origin, in the site's projected CRS (or give the frame as site)."
-        )
-    return FusedPose(
-        machine=name,
-        time=time,
-        validity=Validity.VALID,
-        reasons=(),
-        position=position,
-        yaw=document.yaw,
-        pitch=document.pitch,
-        roll=document.roll,
-        joints=joint_vector(machine, document.joints, f"{field}.joints"),
-        joint_velocities=velocity_vector(
-            machine, document.joint_velocities, f"{field}.joint_velocities"
+        "margins": {name: margins_document(scene, name, ground) for name in placed},
+        "driving_zone": driving_document(
+            machines,
+            {name: pose.joints for name, pose in poses.items()},
+            {name: base_transform(pose) for name, pose in poses.items()},
+            placed,
+            origin,
         ),
-        base_velocity=np.zeros(3),
-        sigma_position=document.sigma.position,
-        sigma_yaw=document.sigma.yaw,
-        sigma_joints=document.sigma.joints,
-        fix=Fix.RTK_FIXED,
-        streams={},
-        clock_offset=None,
-    )
+    }
 
 
 def _machine(machine: Machine, body: Body3D, origin: Array) -> dict[str, Any]:

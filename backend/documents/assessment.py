@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pydantic import BaseModel, Field
 
+from backend.documents.driving import DrivingZoneDocument
+
 Point = tuple[float, float, float]
 Plane = tuple[float, float]
 Matrix = tuple[Point, Point, Point]
@@ -68,8 +70,28 @@ class SunDocument(BaseModel):
     current: SunCurrent
 
 
+class CertifiedMargin(BaseModel):
+    """The same with bodies grown by eta: 3 sigma of the document."""
+
+    eta: float = Field(description="[m]")
+    negative: float = Field(description="[rad]")
+    positive: float = Field(description="[rad]")
+    negative_hits: str | None
+    positive_hits: str | None
+
+
+class MarginDocument(BaseModel):
+    """One joint, bodies as built."""
+
+    negative: float = Field(description="how far it can move before first contact or limit [rad]")
+    positive: float = Field(description="[rad]")
+    negative_hits: str | None = Field(description="machine:body or site:name; null at a limit")
+    positive_hits: str | None
+    certified: CertifiedMargin
+
+
 class AssessmentDocument(BaseModel):
-    """One judged state document. Keys of `sun`: "left<-right" is "left must avoid right"."""
+    """One judged state document; in keys "left<-right" is "left must avoid right"."""
 
     time: float = Field(description="[s]")
     frame: str = Field(description="of all coordinates: projected or site")
@@ -77,3 +99,5 @@ class AssessmentDocument(BaseModel):
     closest: list[ClosestDocument] = Field(description="one entry per pair of machines, or body")
     obstacles: list[ClosestDocument] = Field(description="one entry per obstacle and machine")
     sun: dict[str, SunDocument]
+    margins: dict[str, dict[str, MarginDocument]] = Field(description="by machine and joint role")
+    driving_zone: dict[str, DrivingZoneDocument]

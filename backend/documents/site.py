@@ -12,7 +12,7 @@ from backend.site.site import Site
 
 def site_document(site: Site, config: Config) -> dict[str, Any]:
     """What does not change during a run. Site frame in metres, radians."""
-    boxes = site.obstacle_boxes()
+    boxes = config.site.boxes
     return {
         "name": site.name,
         "title": site.title,
@@ -31,12 +31,12 @@ def site_document(site: Site, config: Config) -> dict[str, Any]:
         },
         "obstacles": [
             {
-                "name": obstacle.name,
+                "name": name,
                 "center": boxes.centers[k].tolist(),
                 "rotation": boxes.rotations[k].tolist(),
                 "half_extents": boxes.half_extents[k].tolist(),
             }
-            for k, obstacle in enumerate(site.obstacles)
+            for k, name in enumerate(config.site.names)
         ],
     }
 

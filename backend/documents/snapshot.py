@@ -11,7 +11,13 @@ from backend.machine.model import Machine
 from backend.machine.outline import outlines_of
 from backend.machine.sun_map import sun_angles
 from backend.pipeline.config import Config
-from backend.pipeline.records import MachineState, PairDistance, Snapshot
+from backend.pipeline.records import (
+    Freedom,
+    MachineMargins,
+    MachineState,
+    PairDistance,
+    Snapshot,
+)
 from backend.safety import words
 from backend.safety.alarms import Alarm
 from backend.safety.record import Concern
@@ -29,6 +35,10 @@ def snapshot_document(snapshot: Snapshot, config: Config) -> dict[str, Any]:
             for name, state in snapshot.machines.items()
         },
         "pairs": [_pair(pair) for pair in snapshot.pairs],
+        "margins": {
+            name: _margins(margins, config.machines[name])
+            for name, margins in snapshot.margins.items()
+        },
         "concerns": [_concern(c, config.machines[c.machine]) for c in snapshot.concerns],
         "alarms": [_alarm(alarm, config) for alarm in snapshot.alarms],
         "images": {
@@ -108,6 +118,34 @@ def _pair(pair: PairDistance) -> dict[str, Any]:
         "reason": pair.reason,
         "approach": pair.approach,
         "checked": pair.checked,
+    }
+
+
+def _margins(margins: MachineMargins, machine: Machine) -> dict[str, Any]:
+    motion = margins.motion
+    return {
+        "eta": margins.eta,
+        "reason": margins.reason,
+        "joints": {
+            joint.role: {"negative": _freedom(negative), "positive": _freedom(positive)}
+            for joint, (negative, positive) in zip(machine.joints, margins.joints, strict=False)
+        },
+        "motion": None
+        if motion is None
+        else {"free": motion.free, "own": motion.own, "hits": motion.hits},
+    }
+
+
+def _freedom(freedom: Freedom) -> dict[str, Any]:
+    return {
+        "free": freedom.free,
+        "own": freedom.own,
+        "hits": freedom.hits,
+        "time_now": freedom.time_now,
+        "time_full": freedom.time_full,
+        "stop_now": freedom.stop_now,
+        "stop_full": freedom.stop_full,
+        "can_stop": freedom.can_stop,
     }
 
 

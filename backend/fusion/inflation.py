@@ -29,19 +29,24 @@ def levers(machine: Machine) -> Array:
     return np.array([reach.get(joint.role, bucket) for joint in machine.joints])
 
 
-def eta(machine: Machine, pose: FusedPose, configured: float) -> float:
-    """Inflation of every body of one machine [m]. configured: the site's factor [m]."""
-    arms = levers(machine)
+def spread(machine: Machine, pose: FusedPose) -> float:
+    """3 sigma of the bucket tip from independent errors, at full stretch [m]."""
     variance = (
         pose.sigma_position**2
         + (machine.max_reach * pose.sigma_yaw) ** 2
-        + float(np.sum((arms * pose.sigma_joints) ** 2))
+        + float(np.sum((levers(machine) * pose.sigma_joints) ** 2))
     )
+    return 3.0 * math.sqrt(variance)
+
+
+def eta(machine: Machine, pose: FusedPose, configured: float) -> float:
+    """Inflation of every body of one machine [m]. configured: the site's factor [m]."""
+    arms = levers(machine)
     base_age = min(pose.streams["position"].age, OLDEST)
     arm_age = min(pose.streams["joints"].age, OLDEST)
     travelled = float(np.linalg.norm(pose.base_velocity)) * base_age
     swept = float(arms @ np.abs(pose.joint_velocities)) * arm_age
-    return configured + 3.0 * math.sqrt(variance) + travelled + swept
+    return configured + spread(machine, pose) + travelled + swept
 
 
 def joint_slack(pose: FusedPose) -> Array:

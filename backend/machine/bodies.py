@@ -46,7 +46,7 @@ def link_boxes(
     triangles = np.concatenate([*(triangles_of(m, folder, file) for m in meshes), swept])
     if len(triangles):
         free = max(max_boxes - len(parts), 2)
-        parts.append(_fitted(triangles, free, max_excess, link.name, progress))
+        parts.append(fitted(triangles, free, max_excess, link.name, progress))
     return join(parts)
 
 
@@ -78,7 +78,7 @@ def _is_marker(shape: Geometry) -> bool:
     return shape.kind != "mesh" and max(shape.size) <= _MARKER
 
 
-def _fitted(
+def fitted(
     triangles: Array, max_boxes: int, max_excess: float, name: str, progress: Progress | None
 ) -> Boxes:
     """`fit_boxes`, remembered on disk: fitting takes seconds, its input hardly ever changes."""

@@ -44,9 +44,13 @@ def triangles_of(geometry: Geometry, folder: Path, file: str) -> Array:
     return np.concatenate(parts) if parts else np.zeros((0, 3, 3))
 
 
-def mesh_triangles(path: Path) -> Array:
-    """All triangles (n, 3, 3) [m] of a mesh file, in the file's frame."""
-    return np.concatenate([vertices[faces] for vertices, faces, _ in _load(path, str(path))])
+def mesh_triangles(path: Path, file: str = "") -> Array:
+    """All triangles (n, 3, 3) [m] of a mesh file, in the file's frame.
+
+    file: what names the mesh, for messages. Raises InputError.
+    """
+    surfaces = _load(path, file or str(path))
+    return np.concatenate([vertices[faces] for vertices, faces, _ in surfaces])
 
 
 def _surfaces(geometry: Geometry, folder: Path, file: str) -> list[Surface]:

@@ -158,6 +158,16 @@ class Machine:
         """(n,) [rad], +inf for continuous joints."""
         return np.array([j.upper for j in self.joints])
 
+    @property
+    def max_velocity(self) -> Array:
+        """(n,) [rad/s]."""
+        return np.array([j.max_velocity for j in self.joints])
+
+    @property
+    def max_acceleration(self) -> Array:
+        """(n,) [rad/s^2]."""
+        return np.array([j.max_acceleration for j in self.joints])
+
     @cached_property
     def link_matrices(self) -> Array:
         """(3, L, 4, 4): T_parent_link(q) = M[0] + sin(q) M[1] + (1 - cos(q)) M[2], Rodrigues."""
@@ -190,6 +200,38 @@ class Machine:
     def body_link_index(self) -> IntArray:
         """(n,) body_links as an index array."""
         return np.array(self.body_links, dtype=np.int64)
+
+    @cached_property
+    def link_parents(self) -> IntArray:
+        """(L,) each link's parent, -1 for the root."""
+        return np.array([link.parent for link in self.links], dtype=np.int64)
+
+    @cached_property
+    def link_joints(self) -> IntArray:
+        """(L,) the joint that moves each link, -1 where it is fixed to its parent."""
+        return np.array([link.joint for link in self.links], dtype=np.int64)
+
+    @cached_property
+    def body_corners(self) -> Array:
+        """(bodies, 8, 3) in the frames of their links [m]."""
+        return self.bodies.corners()
+
+    @cached_property
+    def stretched_levers(self) -> Array:
+        """(bodies, n) how far from each joint's axis a point of each body can be in any posture, 0
+        where the joint does not move the body [m].
+        """
+        levers = np.zeros((len(self.body_links), len(self.joints)))
+        size = np.linalg.norm(self.body_corners, axis=2).max(axis=1, initial=0.0)
+        for body, first in enumerate(self.body_links):
+            length, i = float(size[body]) + 1e-9, first
+            while i >= 0:
+                link = self.links[i]
+                if link.joint >= 0:
+                    levers[body, link.joint] = length
+                length += float(np.linalg.norm(link.T_parent_joint[:3, 3]))
+                i = link.parent
+        return levers
 
     @cached_property
     def joint_links(self) -> IntArray:

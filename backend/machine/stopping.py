@@ -15,10 +15,10 @@ def stopping_distances(machine: Machine, rates: Array, latency: float) -> Array:
     asking to the first braking [s]. A rate that is not known gives NaN.
     """
     v = np.asarray(rates, dtype=float)
-    a = np.array([joint.max_acceleration for joint in machine.joints])
+    a = machine.max_acceleration
     return np.asarray(np.sign(v) * (np.abs(v) * latency + v**2 / (2.0 * a)))
 
 
 def full_stopping_distances(machine: Machine, latency: float) -> Array:
     """(n,) the same at every joint's full rate [rad]."""
-    return stopping_distances(machine, [j.max_velocity for j in machine.joints], latency)
+    return stopping_distances(machine, machine.max_velocity, latency)

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 from backend.fusion.crs import SiteFrame
 from backend.machine.model import Machine
-from backend.pipeline.surroundings import NO_SITE_BODIES, SiteBodies
 from backend.safety.partner import Limits
+from backend.site.bodies import NO_SITE_BODIES, SiteBodies
 
 
 @dataclass(frozen=True)
@@ -15,7 +15,8 @@ class Config:
     """machines: every machine of the site by name; own: those that this backend answers for.
 
     eta: configured inflation [m]; far: beyond this gap of two machines' workspaces no exact
-    distance is computed [m].
+    distance is computed [m]; site: what stands on the site; stop_latency: from asking a machine to
+    stop to its first braking [s].
     """
 
     frame: SiteFrame

@@ -13,15 +13,15 @@ import numpy as np
 
 from backend.cspace.cells import COLLIDING, FREE, CellModels, cell_models, coded
 from backend.cspace.exact import JointGrid
+from backend.cspace.joint_bars import joint_bar
 from backend.cspace.reach_image import ReachImage, reach_image
 from backend.cspace.regions import cell_of
 from backend.fusion.inflation import joint_slack
-from backend.fusion.pose import Validity
 from backend.machine.model import Machine
 from backend.machine.stopping import full_stopping_distances, stopping_distances
 from backend.pipeline.config import Config
 from backend.pipeline.records import Snapshot
-from backend.pipeline.surroundings import Surroundings, surroundings
+from backend.pipeline.surroundings import growth, surroundings_of, why_unknown
 from backend.spatial.boxes import Boxes
 from backend.spatial.types import AnyArray, Array
 
@@ -37,9 +37,9 @@ class Cells:
     """How many cells the images have along each axis."""
 
     slice: int = 64
-    bar: int = 256
+    bar: int = 180
     volume: int = 32
-    reach: tuple[int, int] = (90, 60)
+    reach: tuple[int, int] = (72, 48)
 
 
 @dataclass(frozen=True)
@@ -96,28 +96,7 @@ class OwnImage:
 
 def own_machines(snapshot: Snapshot, config: Config) -> list[str]:
     """Own machines whose surroundings are known now."""
-    return [name for name in config.own if known_surroundings(snapshot, config, name) is not None]
-
-
-def known_surroundings(snapshot: Snapshot, config: Config, own: str) -> Surroundings | None:
-    """None when the machine, or one that may be near it, is not valid: then nothing is certain."""
-    state = snapshot.machines[own]
-    if state.body is None or state.pose.validity is not Validity.VALID:
-        return None
-    partners = [pair for pair in snapshot.pairs if own in (pair.a, pair.b)]
-    if any(pair.reason for pair in partners):
-        return None
-    others = {}
-    for name, other in snapshot.machines.items():
-        if name != own and other.body is not None:
-            others[name] = (config.machines[name], other.body)
-    return surroundings(config.machines[own], state.body, others, config.site)
-
-
-def growth(snapshot: Snapshot, config: Config, own: str) -> float:
-    """eta of `own` and of the least certain partner together; the configured part counts once."""
-    others = [s.eta for name, s in snapshot.machines.items() if name != own]
-    return snapshot.machines[own].eta + max([eta - config.eta for eta in others], default=0.0)
+    return [name for name in config.own if not why_unknown(name, snapshot.machines, snapshot.pairs)]
 
 
 def own_image(
@@ -128,14 +107,14 @@ def own_image(
     tip_height: float | None = None,
 ) -> OwnImage:
     """The images of `own`; see OwnImage. tip_height: of the reach image, above the swing joint [m],
-    the present one when None. Raises ValueError when the surroundings of `own` are not known.
+    the present one when None. Raises ValueError when `own` is not placed.
     """
     machine, state = config.machines[own], snapshot.machines[own]
-    around = known_surroundings(snapshot, config, own)
-    if around is None:
-        raise ValueError(f"the surroundings of {own} are not known")
+    around = surroundings_of(own, snapshot.machines, config)
     q, layers = state.pose.joints, around.layers
-    models = cell_models(machine, q, growth(snapshot, config, own), joint_slack(state.pose))
+    eta = growth(own, snapshot.machines, config)
+    slack = joint_slack(state.pose)
+    models = cell_models(machine, q, eta, slack)
     edges = joint_edges(machine, q)
     volume = _cells(models, layers, edges, q, dict.fromkeys((1, 2, 3), cells.volume))
     return OwnImage(
@@ -146,12 +125,16 @@ def own_image(
         q=q,
         slices=tuple(_slice(models, layers, edges, q, plane, cells.slice) for plane in PLANES),
         bars=tuple(
-            Bar(role, edges[k], _cells(models, layers, edges, q, {k: cells.bar}).ravel())
+            Bar(
+                role,
+                edges[k],
+                joint_bar(machine, q, k, edges[k], cells.bar, layers, models.eta, slack),
+            )
             for k, role in enumerate(ARM)
         ),
         volume=volume[0],
         volume_edges=edges[1:],
-        reach=reach_image(machine, q, around.boxes, cells.reach, tip_height),
+        reach=reach_image(machine, q, layers, cells.reach, tip_height),
         tip_height=tip_height,
         stopping=np.stack(
             [

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from backend.fusion.pose import FusedPose
 from backend.fusion.samples import Sample
@@ -79,6 +79,52 @@ class PairDistance:
 
 
 @dataclass(frozen=True)
+class Freedom:
+    """One joint, one way. Bodies count as grown by what is not known exactly.
+
+    free: to first contact or the joint's limit [rad]; own, hits: the body that touches and what it
+    touches ("right:stick/0", "site:wall", "left:tracks/0"), None at a limit; time_now: until then
+    at the present rate, infinite when the joint does not move that way [s]; time_full: at its full
+    rate [s]; stop_now, stop_full: how far it moves before it stands, latency included [rad].
+    """
+
+    free: float
+    own: str | None
+    hits: str | None
+    time_now: float
+    time_full: float
+    stop_now: float
+    stop_full: float
+
+    @property
+    def can_stop(self) -> bool:
+        """Whether a stop from full rate ends before the contact; at a limit the machine stops."""
+        return self.hits is None or self.free > self.stop_full
+
+
+@dataclass(frozen=True)
+class Motion:
+    """All joints as they move now. free: until first contact or a limit [s]; own, hits as above."""
+
+    free: float
+    own: str | None
+    hits: str | None
+
+
+@dataclass(frozen=True)
+class MachineMargins:
+    """What a machine can do from here. eta: growth of the bodies [m]; reason: why it is not known,
+    else empty; joints: (negative, positive) by joint; motion: None at rest.
+    """
+
+    machine: str
+    eta: float
+    reason: str
+    joints: tuple[tuple[Freedom, Freedom], ...]
+    motion: Motion | None
+
+
+@dataclass(frozen=True)
 class Health:
     """Counters since start."""
 
@@ -101,3 +147,4 @@ class Snapshot:
     concerns: tuple[Concern, ...]
     alarms: tuple[Alarm, ...]
     health: Health
+    margins: dict[str, MachineMargins] = field(default_factory=dict)  # by own machine

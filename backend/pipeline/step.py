@@ -2,7 +2,7 @@
 
 No clock, no I/O: live, simulated and recorded input give the same snapshot for the same input.
 
-    samples → streams → poses at one common time → bodies → distances → concerns → alarms
+    samples → streams → poses at one common time → bodies → distances, margins → concerns → alarms
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from backend.fusion.rig import Rig, make_rig
 from backend.fusion.samples import Sample
 from backend.fusion.streams import Streams, ingest
 from backend.pipeline.config import Config
+from backend.pipeline.margins import machine_margins
 from backend.pipeline.place import base_transform, place
 from backend.pipeline.proximity import measure
 from backend.pipeline.records import Body3D, Health, Inputs, MachineState, Snapshot
@@ -56,6 +57,7 @@ def step(state: State, inputs: Inputs, now: float, config: Config) -> tuple[Stat
         for name, rig in state.rigs.items()
     }
     pairs, close, unknown = measure(machines, config)
+    margins = {name: machine_margins(name, machines, pairs, config) for name in config.own}
     concerns = tuple(_partner(name, close, unknown, now, config) for name in config.own)
     raised = alarms.update(state.alarms, concerns, now)
     health = _health(state.health, inputs, strangers)
@@ -66,6 +68,7 @@ def step(state: State, inputs: Inputs, now: float, config: Config) -> tuple[Stat
         mode=config.mode,
         machines=machines,
         pairs=pairs,
+        margins=margins,
         concerns=concerns,
         alarms=raised,
         health=health,

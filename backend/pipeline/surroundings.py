@@ -2,33 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
+from backend.fusion.pose import Validity
 from backend.machine.model import Machine
-from backend.pipeline.records import Body3D
+from backend.pipeline.config import Config
+from backend.pipeline.records import Body3D, MachineState, PairDistance
+from backend.site.bodies import SiteBodies
 from backend.spatial import transform
-from backend.spatial.boxes import NO_BOXES, Boxes, concatenated
+from backend.spatial.boxes import Boxes, concatenated
 from backend.spatial.types import BoolArray
 
 PARTNER, SITE = "partner", "site"
-
-
-@dataclass(frozen=True)
-class SiteBodies:
-    """Boxes that do not move, in the site frame, and their names."""
-
-    boxes: Boxes = NO_BOXES
-    names: tuple[str, ...] = ()
-
-    def __post_init__(self) -> None:
-        if len(self.names) != len(self.boxes):
-            raise ValueError(f"{len(self.boxes)} boxes have {len(self.names)} names")
-
-
-NO_SITE_BODIES = SiteBodies()
 
 
 @dataclass(frozen=True)
@@ -45,6 +33,35 @@ class Surroundings:
     def layers(self) -> dict[str, Boxes]:
         """ "partner" and "site"."""
         return {PARTNER: self.boxes.take(self.partner), SITE: self.boxes.take(~self.partner)}
+
+
+def why_unknown(
+    own: str, machines: Mapping[str, MachineState], pairs: Iterable[PairDistance]
+) -> str:
+    """Why nothing is certain about what `own` can touch; empty when all of it is known."""
+    state = machines[own]
+    if state.body is None or state.pose.validity is not Validity.VALID:
+        return state.pose.reasons[0] if state.pose.reasons else "is unknown"
+    return next((pair.reason for pair in pairs if own in (pair.a, pair.b) and pair.reason), "")
+
+
+def surroundings_of(own: str, machines: Mapping[str, MachineState], config: Config) -> Surroundings:
+    """All other machines that are placed, and the site, about the placed machine `own`."""
+    body = machines[own].body
+    if body is None:
+        raise ValueError(f"{own} is not placed yet")
+    others = {
+        name: (config.machines[name], state.body)
+        for name, state in machines.items()
+        if name != own and state.body is not None
+    }
+    return surroundings(config.machines[own], body, others, config.site)
+
+
+def growth(own: str, machines: Mapping[str, MachineState], config: Config) -> float:
+    """[m] eta of `own` and of the least certain partner together; the configured part once."""
+    others = [state.eta for name, state in machines.items() if name != own]
+    return machines[own].eta + max([eta - config.eta for eta in others], default=0.0)
 
 
 def surroundings(

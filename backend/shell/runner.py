@@ -1,6 +1,6 @@
-"""Two rates: the fast loop turns what arrived into snapshots, the image loop into images.
+"""The fast loop turns what arrived into snapshots; image loops turn snapshots into images.
 
-The fast loop never waits for an image: workers take the newest snapshot, and what they finish
+The fast loop never waits for an image: image loops take the newest snapshot, and what they finish
 comes back to the pipeline as a stamped input.
 """
 
@@ -11,21 +11,20 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from typing import Protocol
 
 import numpy as np
 
 from backend.pipeline.config import Config
-from backend.pipeline.images import PairImage, SunParameters, ordered_pairs, pair_image
 from backend.pipeline.records import ImageStamp, Inputs, Snapshot
 from backend.pipeline.step import initial, step
 from backend.shell.hub import Hub
+from backend.shell.kinds import ImageKind
 
 log = logging.getLogger(__name__)
 
-IMAGE_WORKERS = 1  # they hold the interpreter: a second one would only slow the fast loop
 HISTORY = 500
 
 
@@ -65,32 +64,38 @@ class Stopwatch:
 
 
 class Runner:
-    """Runs the pipeline in real time until stopped; every view reads the hub."""
+    """Runs the pipeline in real time until stopped; every view reads the hub.
+
+    kinds: the images to make; those of one rate share a loop, and the loops have nothing in common
+    but the interpreter.
+    """
 
     def __init__(
         self,
         config: Config,
-        sun: SunParameters,
+        kinds: Iterable[ImageKind],
         source: Source,
         hub: Hub,
         step_hz: float,
-        image_hz: float,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self.config = config
         self.hub = hub
         self.step_timing = Stopwatch()
-        self.image_timing = Stopwatch()
-        self._sun = sun
+        self._kinds: dict[float, list[ImageKind]] = {}
+        for kind in kinds:
+            self._kinds.setdefault(kind.hz, []).append(kind)
+        self.image_timing = {hz: Stopwatch() for hz in sorted(self._kinds, reverse=True)}
         self._source = source
         self._step_period = 1.0 / step_hz
-        self._image_period = 1.0 / image_hz
         self._clock = clock
         self._done: deque[ImageStamp] = deque(maxlen=100)
         self._stopping = threading.Event()
+        loops: list[tuple[str, Callable[[], None]]] = [("fast loop", self._fast)]
+        loops += [(f"{hz:g} Hz image loop", partial(self._images, hz)) for hz in self._kinds]
         self._threads = [
-            threading.Thread(target=self._guard, args=(loop,), name=name, daemon=True)
-            for name, loop in (("fast-loop", self._fast), ("image-loop", self._images))
+            threading.Thread(target=self._guard, args=(name, loop), name=name, daemon=True)
+            for name, loop in loops
         ]
         self.failure: str = ""
 
@@ -104,12 +109,12 @@ class Runner:
             if thread.is_alive():
                 thread.join(timeout=2.0)
 
-    def _guard(self, loop: Callable[[], None]) -> None:
+    def _guard(self, name: str, loop: Callable[[], None]) -> None:
         try:
             loop()
         except Exception as error:
             # A dead loop must be seen: without new snapshots every view goes stale, and says so.
-            self.failure = f"{loop.__name__.strip('_')} loop stopped: {error!r}"
+            self.failure = f"{name} stopped: {error!r}"
             log.exception("%s", self.failure)
 
     def _fast(self) -> None:
@@ -130,28 +135,23 @@ class Runner:
             self.step_timing.add(start, self._clock())
             self.hub.publish(snapshot)
 
-    def _images(self) -> None:
-        with ThreadPoolExecutor(IMAGE_WORKERS, thread_name_prefix="image") as pool:
-            for _ in self._ticks(self._image_period):
-                snapshot = self.hub.latest()
-                if snapshot is None:
-                    continue
-                start = self._clock()
-                list(
-                    pool.map(
-                        lambda pair, s=snapshot: self._image(s, *pair),
-                        ordered_pairs(snapshot, self.config),
-                    )
-                )
-                self.image_timing.add(start, self._clock())
+    def _images(self, hz: float) -> None:
+        for _ in self._ticks(1.0 / hz):
+            snapshot = self.hub.latest()
+            if snapshot is None:
+                continue
+            start = self._clock()
+            for kind in self._kinds[hz]:
+                for target in kind.targets(snapshot):
+                    self._image(kind, snapshot, target)
+            self.image_timing[hz].add(start, self._clock())
 
-    def _image(self, snapshot: Snapshot, own: str, partner: str) -> PairImage:
+    def _image(self, kind: ImageKind, snapshot: Snapshot, target: tuple[str, ...]) -> None:
         start = self._clock()
-        image = pair_image(snapshot, self.config, own, partner, self._sun)
+        image = kind.make(snapshot, *target)
         now = self._clock()
-        self.hub.publish_image("sun", image.key, image)
-        self._done.append(ImageStamp(image.key, "sun", image.state_time, now, now - start))
-        return image
+        self.hub.publish_image(kind.name, image.key, image)
+        self._done.append(ImageStamp(image.key, kind.name, image.state_time, now, now - start))
 
     def _ticks(self, period: float) -> Iterable[int]:
         """One tick a period; ticks that were missed are dropped, never made up for."""

@@ -17,6 +17,7 @@ from backend.site.tables import (
     Hardware,
     Link,
     Obstacle,
+    ObstacleMesh,
     Rates,
     Safety,
     SiteMachine,
@@ -42,6 +43,7 @@ class Site:
     machines: tuple[SiteMachine, ...]
     sim: Hardware
     obstacles: tuple[Obstacle, ...]
+    meshes: tuple[ObstacleMesh, ...]
     link: Link
 
     @property
@@ -114,6 +116,7 @@ def parse_site(data: dict[str, Any], path: Path) -> Site:
         machines=table.machine,
         sim=table.sim,
         obstacles=table.obstacle,
+        meshes=table.obstacle_mesh,
         link=table.link,
     )
 

@@ -71,6 +71,7 @@ class Rates(Table):
 
     step_hz: Annotated[float, Field(ge=1.0, le=200.0)] = 50.0
     image_hz: Annotated[float, Field(ge=0.1, le=50.0)] = 10.0
+    zone_hz: Annotated[float, Field(ge=0.1, le=50.0)] = 2.0
 
 
 class Start(Table):
@@ -175,6 +176,21 @@ class Obstacle(Table):
         return rz(math.radians(self.yaw_deg or 0.0))
 
 
+class ObstacleMesh(Table):
+    """A mesh file on the site, stood for by boxes that contain it. file: relative to the site file;
+    position: of the file's origin, in the projected CRS; max_excess: of the boxes, where max_boxes
+    are enough for it [m].
+    """
+
+    name: Name
+    file: Annotated[str, Field(min_length=1)]
+    position: Vector
+    yaw_deg: Degrees = 0.0
+    scale: Positive = 1.0
+    max_boxes: Annotated[int, Field(ge=1, le=100)] = 24
+    max_excess: Annotated[float, Field(gt=0.0, le=5.0)] = 0.15
+
+
 class Link(Table):
     """Zenoh endpoints, for example "tcp/127.0.0.1:7447"."""
 
@@ -194,12 +210,14 @@ class SiteTable(Table):
     machine: Annotated[tuple[SiteMachine, ...], Field(min_length=1)]
     sim: Hardware = Hardware()
     obstacle: tuple[Obstacle, ...] = ()
+    obstacle_mesh: tuple[ObstacleMesh, ...] = ()
     link: Link = Link()
 
     @model_validator(mode="after")
     def _distinct(self) -> SiteTable:
         _refuse_duplicates("machine", "name", [machine.name for machine in self.machine])
-        _refuse_duplicates("obstacle", "name", [obstacle.name for obstacle in self.obstacle])
+        obstacles = [o.name for o in self.obstacle] + [m.name for m in self.obstacle_mesh]
+        _refuse_duplicates("obstacle", "name", obstacles)
         prefixes = sorted(machine.prefix + "/" for machine in self.machine)
         for shorter, longer in pairwise(prefixes):
             if longer.startswith(shorter):

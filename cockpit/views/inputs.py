@@ -11,6 +11,7 @@ from shapely.geometry.base import BaseGeometry
 
 from backend.machine.model import Machine
 from backend.pipeline.records import Snapshot
+from backend.site.bodies import site_bodies
 from backend.site.site import Site
 from backend.spatial.boxes import Boxes
 from backend.spatial.types import Array
@@ -70,7 +71,7 @@ def scene_site(site: Site, models: Mapping[str, Machine]) -> SceneSite:
         title=site.title,
         origin=(easting, northing, height),
         machines={m.name: SceneMachine(m.label, models[m.name]) for m in site.machines},
-        obstacles=site.obstacle_boxes(),
+        obstacles=site_bodies(site).boxes,
         slow_below=site.safety.slow_below,
         stop_below=site.safety.stop_below,
     )

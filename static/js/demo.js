@@ -2,7 +2,7 @@
 
 import { $, mark, write } from "./words.js";
 import { metres } from "./axis.js";
-import { label, state } from "./state.js";
+import { exactImage, label, state } from "./state.js";
 
 const CARD_UNTIL = 20; // s; who opens the page later is not greeted
 const SHOWN = 5.5; // s per callout
@@ -18,7 +18,7 @@ const SCRIPT = [
   [22, "limits-panel", () => "SLOW at 0.8 m: only the levers that approach"],
   [28, "alarm-line", () => "STOP level at 0.2 m"],
   [34, "limits-panel", () => "Away is always free"],
-  [42, "slices", () => "Point at a cell: its angles, and what is met"],
+  [42, "slices", () => (exactImage() ? "What if? Click a cell: checked independently" : "Point at a cell: its angles, and what is met")],
   [50, "machines", () => "No data is never “safe”"],
   [57, "alarm-line", () => `Contacts ${state.contacts}, closest approach ${metres(state.closest)}`],
 ];

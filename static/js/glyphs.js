@@ -29,6 +29,17 @@ export function star(g, x, y, hollow, r = 11) {
   }
 }
 
+/** Where a configuration is pinned. */
+export function ring(g, x, y, r) {
+  for (const [width, style] of [[5, "#000000"], [2, "#FFFFFF"]]) {
+    g.lineWidth = width;
+    g.strokeStyle = style;
+    g.beginPath();
+    g.arc(x, y, r, 0, 2 * Math.PI);
+    g.stroke();
+  }
+}
+
 /** The base point, as a cross. */
 export function cross(g, x, y, colour, r = 7) {
   for (const [width, style] of [[6, C.halo], [3, colour]]) {
@@ -80,6 +91,18 @@ export function lampShape(validity, level) {
   }
   if (validity === "STALE") return [svg("circle", { cx: 24, cy: 24, r: 18, fill: "none", stroke: C.stale, "stroke-width": 6, "stroke-dasharray": "5 6" })];
   return [svg("circle", { cx: 24, cy: 24, r: 21, fill: "none", stroke: C.unknown, "stroke-width": 4, "stroke-dasharray": "8 5" }), question(C.unknown)];
+}
+
+/** The outline of STOP: not now, but it would be. */
+export function octagon(g, x, y, r) {
+  g.beginPath();
+  for (let i = 0; i < 8; i++) g.lineTo(x + r * Math.cos(Math.PI / 8 + (i * Math.PI) / 4), y + r * Math.sin(Math.PI / 8 + (i * Math.PI) / 4));
+  g.closePath();
+  for (const [width, style] of [[4, C.halo], [1.5, C.stopLine]]) {
+    g.lineWidth = width;
+    g.strokeStyle = style;
+    g.stroke();
+  }
 }
 
 /** The same shapes, small, on a canvas. */

@@ -13,7 +13,7 @@ export function ageText(age) {
   return age > 1 ? staleText(age) : seconds(age);
 }
 
-const brief = (panel) => panel.clientWidth < 300 || panel.clientHeight < 60;
+const brief = (panel) => panel.clientWidth < 300 || panel.clientHeight < 60 || panel.dataset.exact === "1";
 
 export function head(panel) {
   const who = panel.querySelector(".who");
@@ -21,7 +21,7 @@ export function head(panel) {
   const writeAge = age && slowText(age);
   return {
     who: (text) => who && write(who, text),
-    // A panel too small for the word STALE has it on its canvas; the number stays in the header.
+    // A panel too small or too full for the word STALE has it on its canvas; the number stays in the header.
     age: (value, forced = false) => {
       const level = forced ? "stale" : ageLevel(value);
       const full = forced ? staleText(value) : ageText(value);

@@ -1,6 +1,7 @@
-// One tooltip for all plots: values with units under the pointer.
+// One tooltip for all plots: values with units under the pointer; and what is pointed at, for the ghost.
 
 import { $, write } from "./words.js";
+import { hovered, pin } from "./ghost.js";
 
 let over = null; // {surface, x, y, clientX, clientY}
 
@@ -10,7 +11,9 @@ export function watch(surface) {
     const box = canvas.getBoundingClientRect();
     over = { surface, x: event.clientX - box.left, y: event.clientY - box.top, clientX: event.clientX, clientY: event.clientY };
     refresh();
+    hovered(surface.aim?.(over.x, over.y) ?? null);
   };
+  canvas.addEventListener("click", () => over && pin(surface.aim?.(over.x, over.y) ?? null));
   canvas.addEventListener("pointermove", move);
   canvas.addEventListener("pointerdown", move);
   canvas.addEventListener("pointerleave", hide);
@@ -18,6 +21,7 @@ export function watch(surface) {
 
 export function hide() {
   over = null;
+  hovered(null);
   $("hover").hidden = true;
 }
 
@@ -34,6 +38,10 @@ export function refresh() {
   tip.hidden = false;
   const { offsetWidth: w, offsetHeight: h } = tip;
   const x = over.clientX + 18 + w > innerWidth ? over.clientX - 18 - w : over.clientX + 18;
-  const y = over.clientY + 18 + h > innerHeight ? over.clientY - 18 - h : over.clientY + 18;
+  // Nothing covers the alarm line.
+  const alarm = $("alarm").getBoundingClientRect();
+  const fits = (at) => at >= 2 && at + h <= innerHeight - 2 && (at + h <= alarm.top || at >= alarm.bottom);
+  const below = over.clientY + 18, above = over.clientY - 18 - h;
+  const y = [below, above, alarm.top - h, alarm.bottom].find(fits) ?? below;
   tip.style.transform = `translate(${Math.max(2, Math.round(x))}px, ${Math.max(2, Math.round(y))}px)`;
 }

@@ -3,14 +3,17 @@
 import { connect } from "./socket.js";
 import { readSizes } from "./theme.js";
 import { $ } from "./words.js";
-import { number } from "./axis.js";
-import { accept, choose, far, image, imageAge, imageStale, label, link, machine, names, silence, snapshotAge, state } from "./state.js";
+import { accept, choose, exactImage, far, image, imageAge, imageStale, label, link, names, silence, snapshotAge, state } from "./state.js";
 import { head } from "./head.js";
 import * as hover from "./hover.js";
 import * as alarm from "./alarm.js";
 import * as topbar from "./topbar.js";
 import * as demo from "./demo.js";
 import { startSound, toggleSound } from "./sound.js";
+import * as ghost from "./ghost.js";
+import * as tip from "./tip.js";
+import * as headers from "./headers.js";
+import { next, shown } from "./view.js";
 import { page, startScene, updateCameras } from "./scene.js";
 import { plan } from "./plots/plan.js";
 import { reach } from "./plots/reach.js";
@@ -48,7 +51,20 @@ function own(name) {
   if (!choose(name)) return;
   sessionStorage.setItem("own", name);
   socket.send({ type: "own", machine: name, page });
+  ghost.unpin();
+  redraw();
+}
+
+function redraw() {
   for (const s of [...live, ...images]) Object.assign(s, { dirty: true, last: -Infinity });
+  tip.update();
+  headers.update();
+}
+
+/** Exact images, Sun's, or both over each other. */
+function switchImages() {
+  next();
+  redraw();
 }
 
 function onKey(event) {
@@ -57,8 +73,11 @@ function onKey(event) {
   else if (event.key === "?") help();
   else if (event.key === "a" || event.key === "A") alarm.silenceAlarms();
   else if (event.key === "m" || event.key === "M") toggleSound();
+  else if (event.key === "x" || event.key === "X") switchImages();
+  else if (event.key === "t" || event.key === "T") plots.plan.turning();
   else if (event.key === "Escape") {
     hover.hide();
+    ghost.unpin();
     alarm.showList(false);
     $("help").close();
   } else return;
@@ -88,8 +107,9 @@ const scheme = location.protocol === "https:" ? "wss:" : "ws:";
 const socket = connect(`${scheme}//${location.host}/ws`, onFrame, (word) => {
   state.socket = word;
 });
-
-
+tip.startTip(socket.send);
+ghost.startGhost(socket.send, redraw);
+headers.startHeaders(switchImages);
 
 function onFrame(header, arrays) {
   const partner = state.partner;
@@ -97,13 +117,14 @@ function onFrame(header, arrays) {
   if (header.type === "site") {
     updateCameras(socket.send);
     socket.send({ type: "own", machine: state.own, page });
+    tip.resend();
     for (const s of [...live, ...images]) s.dirty = true;
   } else if (header.type === "snapshot") {
     push(latency.arrival, Date.now() - 1000 * header.wall);
     waitingToDraw = header.wall;
     for (const s of live) s.dirty = true;
     if (partner !== state.partner) for (const s of images) s.dirty = true;
-  } else if (header.type === "sun" && header.key === `${state.own}<-${state.partner}`) {
+  } else if (header.type === "exact" ? header.own === state.own : header.key === `${state.own}<-${state.partner}`) {
     for (const s of images) s.dirty = true;
   }
 }
@@ -116,19 +137,21 @@ function tick() {
   updateCameras(socket.send);
   const subject = `${label(state.own)}`;
   const age = snapshotAge();
-  const old = imageAge(image());
-  const m = machine(state.own);
+  const present = shown() === "sun" ? image() : exactImage();
+  const old = imageAge(present);
   heads.scene.who(state.site ? `${names().length} machines` : "");
   heads.plan.who(`${subject}`);
   heads.reach.who(subject);
   for (const name of ["bars", "limits"]) heads[name].who(subject);
   heads.trends.who(state.partner ? `${subject} ↔ ${label(state.partner)}` : subject);
   for (const name of ["scene", "plan", "bars", "limits", "trends", "timeline"]) heads[name].age(age);
-  const forced = Boolean(image()) && imageStale(image());
-  for (const name of ["reach", "slice-0", "slice-1", "slice-2"]) heads[name].age(far() === null ? old : age, forced);
+  const forced = Boolean(present) && imageStale(present);
+  for (const name of ["reach", "slice-0", "slice-1", "slice-2"]) heads[name].age(present || far() === null ? old : age, forced);
   // Ages and hollow stars must go on while nothing arrives.
   if (old > 0.5 || forced || far() !== null) for (const s of images) s.dirty = true;
   if (link() !== "ok" && state.snapshot) for (const s of live) s.dirty = true;
+  headers.update();
+  ghost.age();
   hover.refresh();
 }
 
@@ -143,7 +166,7 @@ function frame(now) {
   if (drawn && waitingToDraw !== null) {
     push(latency.drawn, Date.now() - 1000 * waitingToDraw);
     waitingToDraw = null;
-    if ((image() || far() !== null || names().length < 2) && document.body.dataset.ready !== "1") document.body.dataset.ready = "1";
+    if ((image() || exactImage() || far() !== null || names().length < 2) && document.body.dataset.ready !== "1") document.body.dataset.ready = "1";
   }
 }
 

@@ -37,8 +37,21 @@ export function message(g, width, height, text) {
   label(g, text, width / 2, height / 2, { align: "center", base: "middle", name: "t3" });
 }
 
+/** The first of several wordings that fits; the last one cut short when none does. */
+export function fit(g, texts, x, y, width, options = {}) {
+  g.font = font(options.name ?? "tick", options.weight ?? 400);
+  let text = texts.find((one) => g.measureText(one).width <= width);
+  if (text === undefined) {
+    text = texts[texts.length - 1];
+    while (text.length > 1 && g.measureText(`${text}…`).width > width) text = text.slice(0, -1);
+    text += "…";
+  }
+  label(g, text, x, y, options);
+  return text;
+}
+
 /** A legend in one line: entries [draw(g, x, y, w), text]; drops the last ones that do not fit. */
-export function legend(g, x, y, width, entries) {
+export function legend(g, x, y, width, entries, gap = 10) {
   g.font = font("tick");
   const swatch = size("tick") + 3;
   let at = x;
@@ -48,8 +61,14 @@ export function legend(g, x, y, width, entries) {
     if (at + w > x + width + 1) break;
     draw(g, at, y, swatch);
     label(g, text, at + swatch + 4, y, { base: "middle" });
-    at += w + 10;
+    at += w + gap;
   }
+}
+
+/** The least width of a legend of these entries. */
+export function legendWidth(g, entries, gap = 10) {
+  g.font = font("tick");
+  return entries.reduce((sum, [, text]) => sum + size("tick") + 7 + g.measureText(text).width + gap, -gap);
 }
 
 export const swatches = {

@@ -24,9 +24,9 @@ export function updateCameras(send) {
   const key = `${names().join(" ")} ${state.own}`;
   if (key === built || !state.site) return;
   built = key;
-  const cameras = [["site", "Site"], ["plan", "Plan"], [`behind ${label(state.own)}`, "Behind"], ["follow", "Follow"]];
+  const cameras = [["site", "Site"], ["plan", "Plan"], [`behind ${label(state.own)}`, "Behind"], ["follow", "Follow"], ["joints", "Joints"]];
   $("cameras").replaceChildren(...cameras.map(([name, text]) => {
-    const button = make("button", { type: "button", title: `Camera: ${name}`, text });
+    const button = make("button", { type: "button", title: name === "joints" ? "The joint space of the own machine: boom, stick and bucket" : `Camera: ${name}`, text });
     button.addEventListener("click", () => send({ type: "camera", name, page }));
     return button;
   }));

@@ -9,7 +9,9 @@ export const state = {
   site: null,
   snapshot: null,
   arrival: -Infinity, // of the newest snapshot, performance.now() [ms]
-  images: new Map(), // "left<-right" -> {header, arrays, arrival, serial}
+  images: new Map(), // Sun's: "left<-right" -> {header, arrays, arrival, serial}
+  exact: new Map(), // "left" -> the same
+  zones: new Map(), // "left<-right" -> the same
   own: null,
   partner: null,
   socket: "connecting",
@@ -21,6 +23,7 @@ export const state = {
   delays: [], // from the server's clock to arrival here [s]
 };
 
+const KINDS = { sun: "images", exact: "exact", zone: "zones" };
 let minimumDelay = Infinity;
 let lastHistory = -Infinity;
 let touching = false;
@@ -47,9 +50,9 @@ export function accept(header, arrays) {
       if (state.delays.length > 250) state.delays.shift();
     }
     remember();
-  } else if (header.type === "sun") {
-    const serial = (state.images.get(header.key)?.serial ?? 0) + 1;
-    state.images.set(header.key, { header, arrays, arrival: now, serial });
+  } else if (header.type in KINDS) {
+    const kept = state[KINDS[header.type]];
+    kept.set(header.key, { header, arrays, arrival: now, serial: (kept.get(header.key)?.serial ?? 0) + 1 });
   }
 }
 
@@ -62,7 +65,7 @@ function normalise(machine) {
 }
 
 function forget() {
-  state.images.clear();
+  for (const kept of Object.values(KINDS)) state[kept].clear();
   state.history.length = 0;
   state.events.length = 0;
   lastHistory = -Infinity;
@@ -114,6 +117,13 @@ export function far() {
 
 export const image = () => (far() === null ? state.images.get(`${state.own}<-${state.partner}`) ?? null : null);
 
+/** The exact image of the own machine, against all partners, the site and itself. */
+export const exactImage = () => state.exact.get(state.own) ?? null;
+export const zoneImage = () => (far() === null ? state.zones.get(`${state.own}<-${state.partner}`) ?? null : null);
+
+/** The machines whose data an image was computed from. */
+const parties = ({ header }) => [header.own, ...(header.partners ?? [header.partner])].filter((name) => machine(name));
+
 /** Why there is no image. */
 export const noImage = () => (far() === null ? "no image yet" : `${label(state.partner)} is over ${Math.floor(far())} m away`);
 
@@ -133,14 +143,14 @@ export function imageAge(entry) {
   if (!entry || !state.snapshot) return Infinity;
   const own = Math.max(0, state.snapshot.time - entry.header.state_time) + silence();
   // A picture is no younger than the pose of a machine that has gone silent.
-  const invalid = [entry.header.own, entry.header.partner].filter((name) => machine(name) && machine(name).validity !== "VALID");
+  const invalid = parties(entry).filter((name) => machine(name).validity !== "VALID");
   return Math.max(own, ...invalid.map(dataAge));
 }
 
 /** Too old, or computed from a machine whose own data are not valid. */
 export function imageStale(entry) {
   if (!entry) return true;
-  return imageAge(entry) > 1 || [entry.header.own, entry.header.partner].some((name) => machine(name)?.validity !== "VALID");
+  return imageAge(entry) > 1 || parties(entry).some((name) => machine(name).validity !== "VALID");
 }
 
 export function link() {

@@ -7,10 +7,11 @@ import { mark } from "./words.js";
  * paint(g, width, height, dpr) draws and returns {state, age, label}: what the drawing shows (for
  * data-state), its age in seconds and a sentence for those who do not see it.
  * probe(x, y) returns lines of text for the pointer, or null.
+ * aim(x, y) returns the configuration under the pointer, {machine, joints}, or null.
  */
-export function surface(canvas, paint, probe) {
+export function surface(canvas, paint, probe, aim) {
   const g = canvas.getContext("2d", { alpha: false, willReadFrequently: true });
-  const s = { canvas, probe, width: 0, height: 0, dirty: true, last: -Infinity, lastLabel: -Infinity, cost: 0 };
+  const s = { canvas, probe, aim, width: 0, height: 0, dirty: true, last: -Infinity, lastLabel: -Infinity, cost: 0 };
 
   new ResizeObserver(() => {
     const dpr = window.devicePixelRatio || 1;

@@ -3,7 +3,7 @@
 export const C = {
   page: "#0F1418", panel: "#171D23", text: "#E6EAED", second: "#A9B3BB", line: "#2C3740", edge: "#6E8496",
   free: "#22303A", outside: "#0B0F13", undecided: "#8A949E", grid: "#34434E",
-  partner: "#A970F0", partnerLine: "#C9A9F7", slow: "#FFA51F", stop: "#C4262E", stopLine: "#FF6B5E", unknown: "#FF6B5E",
+  partner: "#A970F0", partnerLine: "#C9A9F7", site: "#3E8E78", self: "#C0B8D9", people: "#FFFFFF", tipOver: "#79E0B6", slow: "#FFA51F", stop: "#C4262E", stopLine: "#FF6B5E", unknown: "#FF6B5E",
   stale: "#8A949E", halo: "#0B0F13",
 };
 
@@ -29,24 +29,40 @@ export const LEVEL_COLOUR = { SLOW: C.slow, STOP: C.stopLine, UNKNOWN: C.unknown
 
 const tiles = new Map();
 
-/** A "/" hatch, 3 px strokes at 12 px pitch, for a canvas drawn at `dpr` device pixels per pixel. */
-export function hatch(g, colour, dpr, alpha = 0.8) {
-  const key = `${colour} ${dpr} ${alpha}`;
+/** Which pixels of a tile a stroke covers; `side` and `stroke` in pixels along the axes. */
+const STROKES = {
+  "/": (x, y, side, stroke) => (x + y) % side < stroke,
+  "\\": (x, y, side, stroke) => (x - y + side) % side < stroke,
+  "x": (x, y, side, stroke) => (x + y) % side < 0.6 * stroke || (x - y + side) % side < 0.6 * stroke,
+  "-": (x, y, side, stroke) => y % (side / 2) < 0.5 * stroke,
+  "|": (x, y, side, stroke) => x % (side / 2) < 0.5 * stroke,
+  "dots": (x, y, side, stroke) => Math.hypot((x % (side / 2)) - side / 4, (y % (side / 2)) - side / 4) < 0.5 * stroke,
+  "checker": (x, y, side, stroke, half) => (Math.floor(x / half) + Math.floor(y / half)) % 2 === 0,
+};
+
+/** The tile of a hatch at `dpr`: 3 px strokes at 12 px pitch, measured across; a checker of 2 px. */
+export function tile(kind, dpr) {
+  const half = Math.max(1, Math.round(2 * dpr)); // of the checker
+  const side = 4 * half * Math.round((12 * Math.SQRT2 * dpr) / (4 * half));
+  const stroke = 3 * Math.SQRT2 * dpr;
+  const covered = STROKES[kind];
+  const cells = new Uint8Array(side * side);
+  for (let y = 0, p = 0; y < side; y++) for (let x = 0; x < side; x++, p++) cells[p] = covered(x, y, side, stroke, half) ? 1 : 0;
+  return { side, cells };
+}
+
+/** A hatch as a pattern, for a canvas drawn at `dpr` device pixels per pixel. */
+export function hatch(g, colour, dpr, alpha = 0.8, kind = "/") {
+  const key = `${colour} ${dpr} ${alpha} ${kind}`;
   let pattern = tiles.get(key);
   if (!pattern) {
-    const side = Math.round(12 * Math.SQRT2 * dpr); // so that the strokes lie 12 px apart, measured across
-    const tile = document.createElement("canvas");
-    tile.width = tile.height = side;
-    const t = tile.getContext("2d");
-    t.strokeStyle = rgba(colour, alpha);
-    t.lineWidth = 3 * dpr;
-    t.beginPath();
-    for (const shift of [-side, 0, side]) {
-      t.moveTo(shift - side, 2 * side);
-      t.lineTo(shift + 2 * side, -side);
-    }
-    t.stroke();
-    pattern = g.createPattern(tile, "repeat");
+    const { side, cells } = tile(kind, dpr);
+    const image = document.createElement("canvas");
+    image.width = image.height = side;
+    const t = image.getContext("2d");
+    t.fillStyle = rgba(colour, alpha);
+    cells.forEach((on, p) => on && t.fillRect(p % side, Math.floor(p / side), 1, 1));
+    pattern = g.createPattern(image, "repeat");
     pattern.setTransform(new DOMMatrix().scale(1 / dpr));
     tiles.set(key, pattern);
   }

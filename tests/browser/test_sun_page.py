@@ -26,7 +26,7 @@ def still() -> Iterator[Backend]:
 def test_each_panel_draws_what_the_snapshot_says(
     still: Backend, watch: Watch, artifacts: Path
 ) -> None:
-    watched = watch(still.url, SIZES[0])
+    watched = watch(f"{still.url}/?images=sun", SIZES[0])
     page = watched.page
     page.keyboard.press("2")  # B is the machine that must avoid A, as in the paper
     watched.until(
@@ -91,7 +91,7 @@ def test_the_other_scenes_show_their_figures(site: str, watch: Watch, artifacts:
     own, in_zone, d = SCENES[site]
     with backend("demo", "--site", site) as station:
         station.wait_for(all_valid)
-        watched = watch(station.url, SIZES[0])
+        watched = watch(f"{station.url}/?images=sun", SIZES[0])
         watched.page.keyboard.press("2")
         watched.until(f"JSON.parse(document.getElementById('plan').dataset.state).own === '{own}'")
         snapshot = station.wait_for(all_valid)

@@ -7,15 +7,23 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from oracles import collides_at
 
 from backend.collision import box_distance
 from backend.cspace import minkowski
-from backend.cspace.driving import DrivingZone, driving_zone, turning_zone, way_out
+from backend.cspace.driving import (
+    SLOPE_TOLERANCE,
+    DrivingZone,
+    driving_zone,
+    turning_zone,
+    way_out,
+)
+from backend.cspace.driving_cover import cover
 from backend.machine import kinematics
 from backend.machine.load import load_machine
 from backend.machine.model import Machine
 from backend.spatial import rotation, transform
-from backend.spatial.boxes import Boxes
+from backend.spatial.boxes import NO_BOXES, Boxes, concatenated
 
 NEAR = 1e-3
 """A disagreement farther than this from the zone's edge is an error [m]."""
@@ -254,7 +262,7 @@ def test_slice_of_two_boxes(seed: int, half: tuple[float, ...]) -> None:
     centers = rng.uniform(-0.5, 0.5, (2, 3))
     sizes = np.array(half).reshape(2, 3)
     a, b = (Boxes(centers[k, None], R[k, None], sizes[k, None]) for k in (0, 1))
-    zone = minkowski.cover(minkowski.slice_pieces(a, b))
+    zone = cover(minkowski.slice_pieces(a, b))
     points = rng.uniform(-3.0, 3.0, (60, 2))
     hit = np.array([touches(a, b, p) for p in points])
     if zone.is_empty:
@@ -269,3 +277,45 @@ def test_slice_of_two_boxes(seed: int, half: tuple[float, ...]) -> None:
 def test_bad_inflation_is_refused(mini: Machine, partner: Boxes, eta: float) -> None:
     with pytest.raises(ValueError, match="eta"):
         driving_zone(mini, OWN_Q, base(), partner, eta)
+
+
+def test_as_is_agrees_with_an_independent_judge(mini: Machine, partner: Boxes) -> None:
+    """A small sample of tests/campaigns/test_driving_campaign.py."""
+    zone = driving_zone(mini, OWN_Q, base(0.15), partner).as_is
+    points = spread(zone, np.random.default_rng(6), 1500)
+    own = kinematics.body_boxes(mini, kinematics.link_poses(mini, OWN_Q, base(0.15)))
+    unsafe, blocked = disagreements(zone, points, collides_at(partner, own, points))
+    assert len(unsafe) == 0
+    assert blocked.max(initial=0.0) < NEAR
+
+
+def test_a_pole_under_the_raised_arm_leaves_a_hole_on_a_slope(mini: Machine) -> None:
+    raised = np.array([0.0, 1.2, -0.5, 0.0])
+    lamp = Boxes(np.array([[3.0, 1.0, 3.2]]), np.eye(3)[None], np.array([[0.05, 0.05, 0.05]]))
+    zone = driving_zone(mini, raised, base(0.06), lamp).any_swing
+    assert shapely.get_num_interior_rings(shapely.get_parts(zone)).sum() == 1
+    points = spread(zone, np.random.default_rng(7), 400)
+    hit = np.zeros(len(points), dtype=bool)
+    for angle in np.linspace(-np.pi, np.pi, 720):
+        q = np.append(angle, raised[1:])
+        own = kinematics.body_boxes(mini, kinematics.link_poses(mini, q, base(0.06)))
+        hit |= collides_at(lamp, own, points)
+    unsafe, blocked = disagreements(zone, points, hit)
+    assert len(unsafe) == 0
+    assert blocked.max(initial=0.0) < SLOPE_TOLERANCE
+
+
+def test_no_boxes_have_no_zone_and_boxes_out_of_view_do_not_count(
+    mini: Machine, partner: Boxes
+) -> None:
+    assert driving_zone(mini, OWN_Q, base(), NO_BOXES).any_posture.is_empty
+    rng = np.random.default_rng(8)
+    far = Boxes(
+        rng.uniform(60.0, 90.0, (300, 3)) * [1, 1, 0],
+        np.tile(np.eye(3), (300, 1, 1)),
+        np.full((300, 3), 0.5),
+    )
+    alone = driving_zone(mini, OWN_Q, base(), partner)
+    among = driving_zone(mini, OWN_Q, base(), concatenated([partner, far]), view=30.0)
+    assert among.signed_distances == alone.signed_distances
+    assert among.any_posture.equals(alone.any_posture)

@@ -106,7 +106,7 @@ def test_points_agree_with_the_judge(machine: Machine) -> None:
 def test_reach_image_holds_height_and_attitude(machine: Machine) -> None:
     obstacles = scene(machine, 25)
     q = np.array([0.3, 0.4, -1.2, -0.3])
-    image = reach_image(machine, q, obstacles, (24, 30))
+    image = reach_image(machine, q, {"partner": obstacles}, (24, 30))
     seen = set(np.unique(image.state).tolist())
     assert {ReachState.FREE, ReachState.COLLIDING, ReachState.OUT_OF_REACH} <= seen
     for s, r in np.argwhere(image.state <= ReachState.COLLIDING)[::7]:
@@ -123,8 +123,8 @@ def test_reach_image_holds_height_and_attitude(machine: Machine) -> None:
 def test_reach_image_at_another_height_reaches_elsewhere() -> None:
     machine = machine_named("mini")
     q = np.array([0.3, 0.4, -1.2, -0.3])
-    here = reach_image(machine, q, NOTHING, (4, 60))
-    high = reach_image(machine, q, NOTHING, (4, 60), height=9.0)
+    here = reach_image(machine, q, {}, (4, 60))
+    high = reach_image(machine, q, {}, (4, 60), height=9.0)
     assert (here.state == ReachState.FREE).any()
     assert (high.state == ReachState.OUT_OF_REACH).all()
 

@@ -16,6 +16,7 @@ from fastapi_offline import FastAPIOffline
 from starlette.middleware.base import RequestResponseEndpoint
 from starlette.middleware.trustedhost import TrustedHostMiddleware
 
+from backend.errors import InputError
 from backend.fusion.pose import Validity
 from backend.pipeline.records import Snapshot
 from backend.shell.app.feed import Feed, Frames
@@ -24,6 +25,8 @@ from backend.shell.app.models import (
     MachineDescriptionModel,
     SiteModel,
     SnapshotModel,
+    WhatIfModel,
+    WhatIfRequest,
 )
 from backend.shell.app.wire import dumps
 
@@ -40,13 +43,16 @@ PAGE_POLICY = (
 class Sources:
     """What the app reads. site: its document; frames: snapshots and images, encoded once.
 
-    backend: live timings; on_message: what a page asks of the views (camera, own machine).
+    backend: live timings; on_message: what a page asks of the views (camera, own machine);
+    what_if: judges a posture, called with a machine and joint values by role, in a worker thread;
+    raises InputError for what it does not know.
     """
 
     site: dict[str, Any]
     frames: Frames
     backend: Callable[[], dict[str, Any]]
     on_message: Callable[[dict[str, Any]], None]
+    what_if: Callable[[str, dict[str, float]], dict[str, Any]]
 
 
 def create_app(
@@ -115,6 +121,14 @@ def create_app(
         if newest is None:
             return JSONResponse({"detail": "no cycle has finished yet"}, status_code=503)
         return _json(sources.frames.document(newest))
+
+    @app.post("/api/whatif", responses={200: {"model": WhatIfModel}}, tags=["state"])
+    def what_if(request: WhatIfRequest) -> Response:
+        """Whether a machine would touch something in another posture. Moves nothing."""
+        try:
+            return _json(sources.what_if(request.machine, request.joints))
+        except InputError as error:
+            return JSONResponse({"detail": str(error)}, status_code=422)
 
     @app.websocket("/ws")
     async def socket(websocket: WebSocket) -> None:

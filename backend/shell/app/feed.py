@@ -14,9 +14,8 @@ from typing import Any
 
 from fastapi import WebSocket, WebSocketDisconnect
 
-from backend.documents.sun import sun_state_document
-from backend.pipeline.images import PairImage, frame_arrays
 from backend.pipeline.records import Snapshot
+from backend.shell.app.image_frames import frame_of
 from backend.shell.app.wire import encode
 from backend.shell.hub import Hub
 
@@ -46,28 +45,15 @@ class Frames:
 
     def images(self) -> dict[tuple[str, str], tuple[float, bytes]]:
         """(state_time, frame) of every image, by kind and key."""
-        for key, image in self.hub.images().items():
+        images = self.hub.images()
+        for key, image in images.items():
             known = self._images.get(key)
-            if known is None or known[0] != image.state_time:
-                self._images[key] = (image.state_time, _image_frame(image))
+            if known is not None and known[0] == image.state_time:
+                continue
+            frame = frame_of(key[0], image, images)
+            if frame is not None:
+                self._images[key] = (image.state_time, frame)
         return dict(self._images)
-
-
-def _image_frame(image: PairImage) -> bytes:
-    sun = image.sun
-    header = {
-        "type": "sun",
-        "key": image.key,
-        "own": image.own,
-        "partner": image.partner,
-        "state_time": image.state_time,
-        "eta": sun.eta,
-        "m": sun.m,
-        "n": sun.n,
-        "max_reach": sun.b_max_reach,
-        "current": sun_state_document(sun.current),
-    }
-    return encode(header, frame_arrays(image))
 
 
 class Flow:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from pydantic import BaseModel, Field
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, Field
 
 Vector = list[float]
 Unknown = float | None
@@ -109,6 +111,36 @@ class AlarmModel(BaseModel):
     active: bool = Field(description="past its on-delay")
 
 
+class FreedomModel(BaseModel):
+    """One joint, one way. Bodies count as grown by eta."""
+
+    free: float = Field(description="to first contact or the joint's limit [rad]")
+    own: str | None = Field(description="own body that touches; null at a limit")
+    hits: str | None = Field(description="machine:body or site:name; null at a limit")
+    time_now: Unknown = Field(description="at the present rate; null when not moving that way [s]")
+    time_full: float = Field(description="at full rate [s]")
+    stop_now: float = Field(description="stopping distance from now, latency included [rad]")
+    stop_full: float = Field(description="the same from full rate [rad]")
+    can_stop: bool = Field(description="a stop from full rate ends before the contact")
+
+
+class MotionModel(BaseModel):
+    free: float = Field(description="until first contact or a limit as all joints move now [s]")
+    own: str | None
+    hits: str | None
+
+
+class MarginsModel(BaseModel):
+    """What a machine can do from here."""
+
+    eta: Unknown = Field(description="growth of the bodies; null when unknown [m]")
+    reason: str = Field(description="why it is not known, else empty")
+    joints: dict[str, dict[str, FreedomModel]] = Field(
+        description="by role: negative and positive; empty when unknown"
+    )
+    motion: MotionModel | None = Field(description="null at rest, or unknown")
+
+
 class ImageStampModel(BaseModel):
     state_time: float = Field(description="time of the state it shows, local monotonic clock [s]")
     ready_time: float = Field(description="when it was finished [s]")
@@ -130,6 +162,7 @@ class SnapshotModel(BaseModel):
     mode: str = Field(description="LIVE, DEMO or PLAYBACK")
     machines: dict[str, MachineModel]
     pairs: list[PairModel]
+    margins: dict[str, MarginsModel] = Field(description="by own machine")
     concerns: list[ConcernModel]
     alarms: list[AlarmModel] = Field(description="the severest first")
     images: dict[str, ImageStampModel] = Field(description="newest image by kind and pair")
@@ -155,9 +188,41 @@ class TimingModel(BaseModel):
     rate: float = Field(description="achieved rate [Hz]")
 
 
+class WhatIfRequest(BaseModel):
+    """A posture to be judged. A joint that is not named stays where it is."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    machine: str = Field(description="a machine that this backend answers for")
+    joints: dict[str, Annotated[float, Field(ge=-100.0, le=100.0, allow_inf_nan=False)]] = Field(
+        description="the URDF's own joint values by role [rad]"
+    )
+
+
+class TouchModel(BaseModel):
+    own: str = Field(description="body of the machine, part/number")
+    other: str = Field(description="machine:part/number or site:name")
+    layer: str = Field(description="partner, site or self")
+
+
+class WhatIfModel(BaseModel):
+    """python-fcl's verdict on a posture, bodies as built."""
+
+    machine: str
+    joints: dict[str, float] = Field(description="as judged, by role [rad]")
+    state_time: Unknown = Field(description="of the surroundings, local monotonic clock [s]")
+    verdict: str = Field(description="FREE, COLLIDING or UNKNOWN")
+    reason: str = Field(description="why it is UNKNOWN, else empty")
+    distance: Unknown = Field(description="to what is closest, 0 on contact [m]")
+    closest: TouchModel | None
+    hits: list[TouchModel]
+    checked_by: str = Field(description="python-fcl")
+
+
 class BackendModel(BaseModel):
     step: TimingModel = Field(description="the fast loop: fusion, distances, concerns")
-    images: TimingModel = Field(description="the image loop: all pairs")
+    images: TimingModel = Field(description="the image loop: Sun's sets and the exact images")
+    zones: TimingModel = Field(description="the loop of driving zones and free regions")
     failure: str = Field(description="empty while both loops run")
 
 

@@ -6,11 +6,13 @@ import { clear, legend, message, swatches } from "../pen.js";
 import { $, partName, write } from "../words.js";
 import { staleText } from "../head.js";
 import { edgeDistance, inside } from "../geometry.js";
-import { image, imageAge, imageStale, label as nameOf, machine, names, pair, snapshotAge, state } from "../state.js";
+import { image, imageAge, imageStale, label as nameOf, machine, names, pair, snapshotAge, state, zoneImage } from "../state.js";
+import { shownZone } from "../view.js";
 import { surface } from "../surface.js";
 import {
   base, chart, circles, drawZone, exitArrow, gridLines, gridText, iso, nearestLine, north, obstacles, outlines, wedge, zonePoints,
 } from "./plan_layers.js";
+import { distanceText, drawZones, outlineSun, view as zoneView, zoneExit, zoneLegend, zoneLines, zoneNote } from "./plan_zone.js";
 
 const WIDTHS = [20, 30, 50, 100];
 
@@ -65,34 +67,42 @@ function paint(g, width, height, dpr) {
   g.fillRect(box.left, box.top, box.right - box.left, box.bottom - box.top);
   const grid = gridLines(g);
   wedge(g, own);
-  const entry = image();
-  const zone = zonePoints(entry);
+  const how = shownZone();
+  const exact = how === "sun" ? null : zoneImage();
+  const zone = zonePoints(image());
+  const entry = exact ?? image();
   const stale = imageStale(entry);
-  drawZone(g, zone, dpr, stale ? C.stale : C.partner);
+  const zones = exact ? drawZones(g, exact, dpr, stale) : null;
+  if (!exact) drawZone(g, zone, dpr, stale ? C.stale : C.partner);
+  else if (how === "difference") outlineSun(g, zone);
   for (const name of names()) circles(g, name);
   obstacles(g);
   for (const name of names()) if (name !== state.own) outlines(g, name);
   outlines(g, state.own);
   if (view.iso) iso(g, own);
-  const exit = exitArrow(g, own, zone);
+  const exit = exact ? zoneExit(g, exact, own) : exitArrow(g, own, zone);
   const nearest = nearestLine(g);
   for (const name of names()) base(g, name);
   north(g, turn);
+  if (exact) zoneNote(g, exact, stale);
   g.restore();
   if (!view.tracksUp) gridText(g, grid, height, t);
   const age = Math.max(snapshotAge(), entry ? imageAge(entry) : 0);
+  const staleZone = `zone ${staleText(imageAge(entry))}`;
   legend(g, 6, height - 0.65 * t, width - 8, [
-    [swatches.area(hatch(g, stale ? C.stale : C.partner, dpr), stale ? C.stale : C.partner), stale ? `zone ${staleText(imageAge(entry))}` : "zone for ✚"],
+    ...(exact && how === "difference" ? [[swatches.line("#FFFFFF"), "Sun"]] : []),
+    ...(exact ? stale ? [[zoneLegend(g, dpr, stale, { as_is: 1 })[0][0], staleZone]] : zoneLegend(g, dpr, stale, zones)
+      : [[swatches.area(hatch(g, stale ? C.stale : C.partner, dpr), stale ? C.stale : C.partner), stale ? staleZone : "zone for ✚ (Sun)"]]),
     [swatches.line(C.text), "reach now"],
     [swatches.line(C.text, [4, 3], 1.5), "max"],
   ]);
   return {
     state: {
       own: state.own, partner: state.partner, width: view.width, centre: view.centre, up: view.tracksUp ? "tracks" : "north",
-      base: own.position?.slice(0, 2), zone: zone.length, zone_stale: stale, exit, nearest, machines: names().filter((name) => machine(name)?.outlines).length,
+      base: own.position?.slice(0, 2), zone: zone.length, zones, shown: how, zone_stale: stale, exit, nearest, machines: names().filter((name) => machine(name)?.outlines).length,
     },
     age,
-    label: `Plan of ${view.width} m: ${nameOf(state.own)} base at ${own.position_projected ? own.position_projected.slice(0, 2).map((v) => v.toFixed(1)).join(", ") : "unknown"}; nearest distance to ${nameOf(state.partner)} ${nearest === null ? "unknown" : metres(nearest)}${exit ? `; base inside the warning zone by ${metres(exit)}` : ""}`,
+    label: `Plan of ${view.width} m: ${nameOf(state.own)} base at ${own.position_projected ? own.position_projected.slice(0, 2).map((v) => v.toFixed(1)).join(", ") : "unknown"}; nearest distance to ${nameOf(state.partner)} ${nearest === null ? "unknown" : metres(nearest)}${exit ? `; base inside the warning zone by ${metres(exit)}` : ""}${exact ? `; ${distanceText(exact)}` : ""}`,
   };
 }
 
@@ -102,7 +112,9 @@ function probe(x, y) {
   const [e, n] = chart.back(x, y);
   const origin = state.site?.frame?.origin ?? [0, 0, 0];
   const lines = [`E ${(e + origin[0]).toFixed(1)} m, N ${(n + origin[1]).toFixed(1)} m`];
-  const zone = zonePoints(image());
+  const exact = shownZone() === "sun" ? null : zoneImage();
+  const zone = exact ? [] : zonePoints(image());
+  if (exact) lines.push(...zoneLines(exact, [e, n], inside));
   if (zone.length > 2) lines.push(inside([e, n], zone) ? `inside ${nameOf(state.own)}'s warning zone (${nameOf(state.partner)})` : `free for ${nameOf(state.own)}'s base (Sun)`);
   const from = own.swing_center ?? own.position;
   if (from) lines.push(`${number(Math.hypot(e - from[0], n - from[1]), 2)} m from ${nameOf(state.own)}, azimuth ${degrees(Math.atan2(n - from[1], e - from[0]))}`);
@@ -122,6 +134,10 @@ export function plan() {
     view.width = WIDTHS[(WIDTHS.indexOf(view.width) + 1) % WIDTHS.length];
     redraw();
   });
+  s.turning = () => {
+    zoneView.turning = !zoneView.turning;
+    redraw();
+  };
   $("plan-up").addEventListener("click", () => {
     view.tracksUp = !view.tracksUp;
     write($("plan-up"), view.tracksUp ? "Trk" : "N");

@@ -168,7 +168,11 @@ export function iso(g, own) {
 export function exitArrow(g, own, zone) {
   if (zone.length < 3 || !own.position || !inside(own.position, zone)) return null;
   const { distance, point } = edgeDistance(own.position, zone);
-  const [x0, y0] = chart.at(own.position), [x1, y1] = chart.at(point);
+  return drawArrow(g, own.position, point, distance);
+}
+
+export function drawArrow(g, from, to, distance) {
+  const [x0, y0] = chart.at(from), [x1, y1] = chart.at(to);
   const a = Math.atan2(y1 - y0, x1 - x0);
   for (const [w, colour] of [[5, C.halo], [2.5, C.text]]) {
     segment(g, x0, y0, x1, y1, colour, w);
@@ -219,7 +223,10 @@ export function base(g, name) {
   cross(g, x, y, name === state.own ? "#FFFFFF" : tint(name), name === state.own ? 7 : 5);
   const above = state.partner && m.position[1] >= Math.max(...[state.own, state.partner].map((k) => machine(k)?.position?.[1] ?? -Infinity));
   const r = (m.max_reach ?? 4) * 0.36 * chart.px + size("tick");
-  label(g, nameOf(name), x, above ? y - r : y + r, { align: "center", base: "middle", colour: tint(name), weight: 600, halo: true });
+  // Outwards, so that the distance has its place between the two names.
+  const other = machine(name === state.own ? state.partner : state.own);
+  const out = other?.position && machine(name) !== other ? Math.sign(x - chart.at(other.position)[0]) * 1.2 * size("tick") : 0;
+  label(g, nameOf(name), x + out, above ? y - r : y + r, { align: "center", base: "middle", colour: tint(name), weight: 600, halo: true });
 }
 
 export function north(g, turn) {

@@ -1,0 +1,161 @@
+"""Images as frames of the page's websocket."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from backend.cspace.cells import LAYER_BITS
+from backend.cspace.reach_image import ReachImage, ReachState
+from backend.documents.sun import sun_state_document
+from backend.pipeline.exact import ARM, OwnImage, Slice
+from backend.pipeline.images import PairImage, frame_arrays
+from backend.pipeline.regions import RegionsImage
+from backend.pipeline.zones import ZoneImage
+from backend.shell.app.wire import encode
+from backend.shell.kinds import EXACT, REGIONS, SUN, ZONE
+from backend.spatial.types import AnyArray
+
+NEAR_LIMIT, BEYOND_LIMIT, OUT_OF_REACH = 8, 16, 32
+"""Bits of a reach cell beside the layers' own."""
+
+
+def sun_frame(image: PairImage) -> bytes:
+    sun = image.sun
+    header = {
+        "type": SUN,
+        "key": image.key,
+        "own": image.own,
+        "partner": image.partner,
+        "state_time": image.state_time,
+        "eta": sun.eta,
+        "m": sun.m,
+        "n": sun.n,
+        "max_reach": sun.b_max_reach,
+        "current": sun_state_document(sun.current),
+    }
+    return encode(header, frame_arrays(image))
+
+
+def exact_frame(image: OwnImage, regions: RegionsImage | None = None) -> bytes:
+    """regions: the machine's newest.
+
+    Arrays slice0.., patch0.., bar0.. and reach: uint8 cells; see backend.cspace.cells.
+    """
+    arrays: dict[str, AnyArray] = {}
+    for k, part in enumerate(image.slices):
+        arrays[f"slice{k}"] = part.cells
+        if part.patch is not None:
+            arrays[f"patch{k}"] = part.patch.cells
+    for k, bar in enumerate(image.bars):
+        arrays[f"bar{k}"] = bar.cells
+    arrays["reach"] = reach_cells(image.reach)
+    reach = image.reach
+    header = {
+        "type": EXACT,
+        "key": image.key,
+        "own": image.own,
+        "partners": list(image.partners),
+        "state_time": image.state_time,
+        "eta": image.eta,
+        "q": {role: float(image.q[k]) for k, role in enumerate(ARM)},
+        "slices": [
+            {
+                "across": part.across,
+                "up": part.up,
+                **_rectangle(part),
+                "patch": None if part.patch is None else _rectangle(part.patch),
+            }
+            for part in image.slices
+        ],
+        "bars": [{"joint": bar.joint, "edges": bar.edges.tolist()} for bar in image.bars],
+        "volume": {
+            "joints": list(ARM[1:]),
+            "edges": image.volume_edges.tolist(),
+            "swing": float(image.q[0]),
+        },
+        "reach": {
+            "swing": [float(reach.swing_edges[0]), float(reach.swing_edges[-1])],
+            "reach": [float(reach.reach_edges[0]), float(reach.reach_edges[-1])],
+            "height": reach.height,
+            "picked": image.tip_height is not None,
+            "attitude": reach.attitude,
+            "elbow": reach.elbow,
+        },
+        "stopping": {
+            role: {"now": float(image.stopping[k, 0]), "full": float(image.stopping[k, 1])}
+            for k, role in enumerate(ARM)
+        },
+        "regions": None if regions is None else vars(regions),
+    }
+    return encode(header, arrays)
+
+
+def reach_cells(reach: ReachImage) -> AnyArray:
+    """(swing, reach) uint8: the layers' bits where it collides, and the bits above."""
+    cells = np.zeros(reach.state.shape, dtype=np.uint8)
+    for name, hit in reach.layers.items():
+        cells[hit] |= LAYER_BITS[name]
+    cells[reach.near_limit] |= NEAR_LIMIT
+    cells[reach.state == ReachState.BEYOND_LIMIT] = BEYOND_LIMIT
+    cells[reach.state == ReachState.OUT_OF_REACH] = OUT_OF_REACH
+    return cells
+
+
+def zone_frame(image: ZoneImage) -> bytes:
+    """Per variant an array of vertices (k, 2), and `.._rings` (r, 2): vertices of each ring, and
+    1 for an exterior, 0 for a hole of the exterior before it.
+    """
+    arrays: dict[str, AnyArray] = {}
+    variants: dict[str, Any] = {}
+    for name, zone in image.zones.items():
+        arrays[name], arrays[f"{name}_rings"] = rings(zone)
+        way = image.exits[name]
+        variants[name] = {
+            "signed_distance": way.signed_distance if math.isfinite(way.signed_distance) else None,
+            "empty": zone.is_empty,
+            "exit": None
+            if way.length <= 0.0
+            else {"direction": way.direction.tolist(), "length": way.length},
+        }
+    header = {
+        "type": ZONE,
+        "key": image.key,
+        "own": image.own,
+        "partner": image.partner,
+        "state_time": image.state_time,
+        "eta": image.eta,
+        "base": image.base.tolist(),
+        "variants": variants,
+    }
+    return encode(header, arrays)
+
+
+def rings(zone: BaseGeometry) -> tuple[AnyArray, AnyArray]:
+    """(k, 2) float32 vertices of all rings of (multi)polygons, (r, 2) int32 sizes and kinds."""
+    vertices, sizes = [], []
+    for polygon in () if zone.is_empty else shapely.get_parts(zone):
+        for k, ring in enumerate([polygon.exterior, *polygon.interiors]):
+            points = shapely.get_coordinates(ring)[:-1]
+            vertices.append(points)
+            sizes.append((len(points), 1 if k == 0 else 0))
+    xy = np.concatenate(vertices) if vertices else np.zeros((0, 2))
+    return xy.astype(np.float32), np.array(sizes, dtype=np.int32).reshape(-1, 2)
+
+
+def frame_of(kind: str, image: Any, images: Mapping[tuple[str, str], Any]) -> bytes | None:
+    """The frame of one image. images: the newest of all kinds; None for what pages are not sent."""
+    if kind == SUN:
+        return sun_frame(image)
+    if kind == EXACT:
+        return exact_frame(image, images.get((REGIONS, image.key)))
+    return zone_frame(image) if kind == ZONE else None
+
+
+def _rectangle(part: Slice) -> dict[str, Any]:
+    return {"x": part.x.tolist(), "y": part.y.tolist()}
