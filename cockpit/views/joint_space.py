@@ -31,7 +31,7 @@ COLORS = {
     UNDECIDED: palette.UNDECIDED,
 }
 BODY, BODY_OLD = 0.70, 0.45  # opacity of the colliding cells: the star shows through them
-SHELL = 0.14  # of the undecided cells
+SHELL = 0.20  # of the undecided cells
 TITLE = (0.5 * SIDE, 0.5 * SIDE, SIDE + 0.7)  # where the words stand [m]
 STAR = 0.085  # radius [m]
 Meshes = dict[str, tuple[Float32, UInt32]]
