@@ -1,69 +1,85 @@
-"""What one browser sees that others do not: its own machine's zones, its joint space, its ghost."""
+"""What one browser shows of its own: own machine, joint space, ghost; and where its camera is."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
 
 import viser
 
 from backend.pipeline.records import Snapshot
-from backend.spatial.types import Array
-from cockpit.views.cameras import JOINTS
+from cockpit.views.cameras import CameraPose
 from cockpit.views.ghost import GhostNodes
 from cockpit.views.inputs import SceneSite, SnapshotSource
-from cockpit.views.joint_space import JointSpaceNodes
+from cockpit.views.joint_space import JointSpace
 from cockpit.views.zone import OwnNodes
 
+JOINTS = "joints"  # the camera that looks at the joint space
 
-@dataclass
+
 class Browser:
-    """looks: the name of its camera."""
+    """Nodes in one client's scope. Nothing that is not looked at is made or kept current.
 
-    own: OwnNodes
-    joints: JointSpaceNodes
-    looks: str
-    ghost: GhostNodes | None = None
+    following: the pose of a camera that moves with the own machine, None while it does not.
+    """
 
-    def remove(self) -> None:
-        """Take out what belongs to the own machine."""
-        self.own.remove()
-        self.joints.remove()
-
-    def update(
-        self, snapshot: Snapshot, images: SnapshotSource, ground: float, lost: float
+    def __init__(
+        self, client: viser.ClientHandle, site: SceneSite, own: str, camera: str, zone_kind: str
     ) -> None:
-        """ground: its height [m]; lost: seconds without a snapshot."""
-        self.own.update(snapshot, images, ground, lost)
-        image = images.image("exact", self.own.own)
-        self.joints.update(image, snapshot.state_time + lost, self.looks == JOINTS)
-        self.update_ghost(snapshot)
+        self.client = client
+        self.camera = camera
+        self.following: CameraPose | None = None
+        self.zone_kind = zone_kind
+        self._site = site
+        self._own = self._own_nodes(own)
+        self._joints: JointSpace | None = None
+        self._ghosts: dict[str, GhostNodes] = {}
+        self._ghost: str | None = None
 
-    def update_ghost(self, snapshot: Snapshot) -> None:
-        if self.ghost is not None:
-            self.ghost.update(snapshot.machines.get(self.ghost.machine))
+    @property
+    def own(self) -> str:
+        """The own machine."""
+        return self._own.own
+
+    @own.setter
+    def own(self, name: str) -> None:
+        if name == self.own:
+            return
+        self._own.remove()
+        self._own = self._own_nodes(name)
+        if self._joints is not None:
+            self._joints.remove()
+            self._joints = None
+
+    def _own_nodes(self, own: str) -> OwnNodes:
+        tracks = self._site.machines[own].model.tracks
+        return OwnNodes(self.client.scene, own, 0.8 * tracks.length)
 
     def show_ghost(
-        self, scene: viser.SceneApi, site: SceneSite, machine: str | None, posture: Array | None
+        self, machine: str | None, joints: Mapping[str, float] | None, colliding: bool | None
     ) -> None:
-        """Another posture (n,) of a machine; without a machine, no ghost."""
-        if self.ghost is not None and self.ghost.machine != machine:
-            self.ghost.remove()
-            self.ghost = None
-        if machine is None:
+        """A ghost of `machine` at these joints in place of the one before; None for none."""
+        if self._ghost is not None and self._ghost != machine:
+            self._ghosts[self._ghost].hide()
+        self._ghost = machine
+        if machine is None or joints is None:
             return
-        if self.ghost is None:
-            self.ghost = GhostNodes(scene, machine, site.machines[machine])
-        self.ghost.joints = posture
+        if machine not in self._ghosts:
+            entry = self._site.machines[machine]
+            self._ghosts[machine] = GhostNodes(self.client.scene, machine, entry)
+        self._ghosts[machine].pose(joints, colliding)
 
-
-def browser_of(
-    scene: viser.SceneApi, site: SceneSite, own: str, old: Browser | None, looks: str
-) -> Browser:
-    """A browser's nodes; what `old` showed and keeps when the own machine changes."""
-    entry = site.machines[own]
-    nodes = OwnNodes(scene, own, 0.8 * entry.model.tracks.length)
-    joints = JointSpaceNodes(scene, entry.label)
-    if old is None:
-        return Browser(nodes, joints, looks)
-    nodes.kind = old.own.kind
-    return Browser(nodes, joints, old.looks, old.ghost)
+    def update(
+        self, snapshot: Snapshot, images: SnapshotSource, ground: float, now: float, lost: float
+    ) -> None:
+        """ground: its height [m]; now: a monotonic clock; lost: as in Scene [s]."""
+        with self.client.atomic():
+            self._own.update(snapshot, images, ground, lost, self.zone_kind)
+            if self._ghost is not None:
+                self._ghosts[self._ghost].update(snapshot)
+            looked_at = self.camera == JOINTS
+            if looked_at and self._joints is None:
+                label = self._site.machines[self.own].label
+                self._joints = JointSpace(self.client.scene, label)
+            if self._joints is not None:
+                image = images.image("exact", self.own) if looked_at else None
+                self._joints.update(image, snapshot.state_time + lost, now, looked_at)

@@ -1,4 +1,4 @@
-"""Where the cameras stand: "site", "plan", "follow", "behind <machine>", and "joints"."""
+"""Where the cameras stand: "site", "plan", "follow", "behind <machine>" and "joints"."""
 
 from __future__ import annotations
 
@@ -9,13 +9,15 @@ import numpy as np
 from backend.pipeline.records import Body3D, Snapshot
 from backend.spatial.types import Array
 from cockpit.views.inputs import SceneSite
-from cockpit.views.joint_space import ORIGIN, SIZE
+from cockpit.views.joint_frame import PLACE, SIZE
 
 FOV = np.deg2rad(45.0)  # vertical
 PLAN_FOV = np.deg2rad(24.0)
 ELEVATION = np.deg2rad(32.0)  # of the site camera
 ASPECT = 1.65  # width to height that the cameras are laid out for
-JOINTS = "joints"
+JOINTS_FOV = np.deg2rad(30.0)
+JOINTS_FROM = np.array([0.5, -1.0, 0.5])  # of the box of the joint-space view
+JOINTS_MARGIN = 1.1  # what the axes' names take, as a share of the box
 REACH_UNPLACED = 8.0  # [m] drawn around the origin before any machine is placed
 
 
@@ -30,8 +32,7 @@ class CameraPose:
 
 def camera_names(site: SceneSite) -> tuple[str, ...]:
     """Every name that `camera_pose` knows."""
-    behind = (f"behind {name}" for name in site.machines)
-    return ("site", "plan", "follow", *behind, JOINTS)
+    return ("site", "plan", "follow", *(f"behind {name}" for name in site.machines), "joints")
 
 
 def camera_pose(
@@ -40,16 +41,14 @@ def camera_pose(
     """The camera called `name`, for the machines where they are now.
 
     "behind left" takes a machine's name or label, in any case; "follow" is behind `own` and is
-    asked for again in each cycle; "joints" looks at the joint space of `own`.
-    aspect: width to height of the picture. Raises ValueError naming the cameras there are.
+    asked for again in each cycle. aspect: width to height of the picture.
+    Raises ValueError naming the cameras there are.
     """
     placed = _placed(snapshot)
-    if name == JOINTS:
-        middle = np.array(ORIGIN) + SIZE * np.array([0.5, 0.5, 0.52])
-        away = SIZE * np.array([1.35, -1.75, 0.95]) * max(1.0, ASPECT / max(aspect, 0.5))
-        return CameraPose(middle + away, middle, float(FOV))
     if name == "follow":
         return _behind(site, own, placed)
+    if name == "joints":
+        return _joints(aspect)
     if name.startswith("behind"):
         wanted = name.removeprefix("behind").strip(" :").lower()
         for machine, entry in site.machines.items():
@@ -115,3 +114,12 @@ def _behind(site: SceneSite, name: str, placed: dict[str, Body3D]) -> CameraPose
     position = on_ground - 1.15 * reach * ahead + 0.45 * reach * side
     position[2] += 1.05 * reach
     return CameraPose(position, on_ground + 0.45 * reach * ahead + [0, 0, 0.1 * reach], float(FOV))
+
+
+def _joints(aspect: float) -> CameraPose:
+    """In front of the joint-space view's box, the whole of it in the picture."""
+    center = np.array(PLACE) + SIZE / 2.0 + [0.0, 0.0, -0.04 * SIZE[2]]
+    radius = JOINTS_MARGIN * float(np.linalg.norm(SIZE)) / 2.0
+    distance = radius / np.sin(JOINTS_FOV / 2.0) / min(max(aspect, 0.3) / 1.3, 1.0)
+    away = JOINTS_FROM / np.linalg.norm(JOINTS_FROM)
+    return CameraPose(center + distance * away, center, float(JOINTS_FOV))

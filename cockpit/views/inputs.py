@@ -3,14 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, Protocol
+
+from shapely.geometry.base import BaseGeometry
 
 from backend.machine.model import Machine
 from backend.pipeline.records import Snapshot
 from backend.site.bodies import site_bodies
 from backend.site.site import Site
 from backend.spatial.boxes import Boxes
+from backend.spatial.types import Array
+from cockpit.views.shapes import LinkLooks, link_looks
+
+GHOST_FACES = 8000  # of a machine whose ghost is drawn as the machine looks
 
 
 @dataclass(frozen=True)
@@ -19,6 +26,19 @@ class SceneMachine:
 
     label: str
     model: Machine
+
+    @cached_property
+    def looks(self) -> tuple[LinkLooks, ...]:
+        """How each link looks; worked out once, for the machine and all of its ghosts."""
+        return tuple(link_looks(self.model, k) for k in range(len(self.model.links)))
+
+    @cached_property
+    def ghost_looks(self) -> tuple[LinkLooks, ...]:
+        """`looks`, or the bodies where those are so detailed that a ghost would come late."""
+        if sum(len(faces) for link in self.looks for _, faces, _ in link.meshes) <= GHOST_FACES:
+            return self.looks
+        bare = replace(self.model, links=tuple(replace(k, visuals=()) for k in self.model.links))
+        return tuple(link_looks(bare, k) for k in range(len(bare.links)))
 
 
 @dataclass(frozen=True)
@@ -57,6 +77,33 @@ def scene_site(site: Site, models: Mapping[str, Machine]) -> SceneSite:
     )
 
 
+class ZoneImage(Protocol):
+    """The part of an image of an ordered pair that the ground shows.
+
+    zone: (k, 2) site frame [m], where the own base point must not go; state_time [s].
+    """
+
+    @property
+    def zone(self) -> Array: ...
+
+    @property
+    def state_time(self) -> float: ...
+
+
+class ExactZoneImage(Protocol):
+    """The part of an exact zone of an ordered pair that the ground shows.
+
+    zones: "as_is", "any_swing", "any_posture" -> polygons with holes in the site frame [m], where
+    the own base point must not go; None, or missing, when unknown. state_time [s].
+    """
+
+    @property
+    def zones(self) -> Mapping[str, BaseGeometry | None]: ...
+
+    @property
+    def state_time(self) -> float: ...
+
+
 class SnapshotSource(Protocol):
     """The newest snapshot and images; a hub."""
 
@@ -64,4 +111,9 @@ class SnapshotSource(Protocol):
 
     def wait(self, after_cycle: int, timeout: float) -> Snapshot | None: ...
 
-    def image(self, kind: str, key: str) -> Any | None: ...
+    def image(self, kind: str, key: str) -> Any | None:
+        """The newest image of a kind, None before there is one.
+
+        "sun": a ZoneImage and "zone": an ExactZoneImage, both per "own<-partner"; "exact": a
+        backend.pipeline.exact.OwnImage, per own machine.
+        """

@@ -1,166 +1,206 @@
-"""Joint space in 3D: what boom, stick and bucket would hit at the present swing, and the arm now.
+"""What one operator sees of the own machine's joint space: all that is blocked at this swing.
 
-It stands high above the site, where no other camera looks, each joint's range drawn as SIZE metres.
+The cells are a slice through the present swing, as boom x stick x bucket; they stand in a place of
+their own, far below the site, where only the camera "joints" looks.
 """
 
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import viser
 
-from backend.cspace.cells import COLLIDING, FREE, PARTNER, SELF, SITE
-from backend.pipeline.exact import ARM, OwnImage
-from backend.spatial.types import Array
+from backend.pipeline.exact import OwnImage
 from cockpit.views import palette
-from cockpit.views.cell_surface import exposed_faces, layer_masks
-from cockpit.views.shapes import Float32
+from cockpit.views.joint_frame import PLACE, SIDE, SIZE, draw_frame, place
+from cockpit.views.joint_marks import full_box, plumb_lines, stop_bars
+from cockpit.views.labels import Words
+from cockpit.views.shapes import NO_LINE, Float32, UInt32
+from cockpit.views.surface import NAMES, UNDECIDED, surfaces
 
-SIZE = 4.0  # [m] of each axis
-ORIGIN = (0.0, 0.0, 400.0)
-PERIOD = 0.4  # [s] at least between two surfaces: each is some 100 kB
-OLD = 1.0  # [s] after which the image counts as stale
-LAYERS = ((PARTNER, palette.PARTNER), (SITE, palette.SITE), (SELF, palette.SELF))
-HITS = PARTNER | SITE | SELF
-_EDGES = np.array(
-    [[a, b] for a in np.ndindex(2, 2, 2) for b in np.ndindex(2, 2, 2) if sum(b) - sum(a) == 1
-     and all(y >= x for x, y in zip(a, b, strict=True))],
-    dtype=np.float32,
-)  # fmt: skip
+OLD = 1.0  # [s] after which an image is no longer coloured
+PERIOD = 0.2  # [s] between changes of the surfaces: each one sends them again
+
+COLORS = {
+    "partner": palette.PARTNER,
+    "site": palette.SITE,
+    "self": palette.SELF,
+    "other": palette.TEXT,
+    UNDECIDED: palette.UNDECIDED,
+}
+BODY, BODY_OLD = 0.70, 0.45  # opacity of the colliding cells: the star shows through them
+SHELL = 0.20  # of the undecided cells
+TITLE = (0.5 * SIDE, 0.5 * SIDE, SIDE + 0.7)  # where the words stand [m]
+STAR = 0.085  # radius [m]
+Meshes = dict[str, tuple[Float32, UInt32]]
 
 
-class JointSpaceNodes:
-    """Nodes of one browser. Made once; `update` sets what changed while the view is `shown`."""
+class JointSpace:
+    """Nodes of one browser, in its own scope; made at the first look, then only changed."""
 
     def __init__(self, scene: viser.SceneApi, label: str) -> None:
         """label: the own machine's, as operators call it."""
-        self._label = label
-        self._root = scene.add_frame("/joints", show_axes=False, position=ORIGIN, visible=False)
         self._scene = scene
-        triangle = np.zeros((3, 3), np.float32), np.array([[0, 1, 2]], np.uint32)
-        self._surfaces = [
-            scene.add_mesh_simple(
-                f"/joints/{name}", *triangle, color=color, opacity=opacity, flat_shading=True,
-                side="double", cast_shadow=False, receive_shadow=False, visible=False,
-            )
-            for name, color, opacity in (
-                *((f"layer{bit}", color, None) for bit, color in LAYERS),
-                ("undecided", palette.STALE, 0.18),
-            )
-        ]  # fmt: skip
-        self._box = _lines(scene, "box", SIZE * _EDGES, palette.SECONDARY, 1.5)
-        self._walls = _lines(scene, "walls", np.zeros((3, 2, 3), np.float32), palette.TEXT, 1.0)
-        self._stops = [
-            _lines(scene, name, np.zeros((3, 2, 3), np.float32), color, pixels)
-            for name, color, pixels in (
-                ("stop-now", palette.TEXT, 5.0), ("stop-full", palette.SECONDARY, 2.0)
-            )
-        ]  # fmt: skip
+        self._label = label
+        self._root = scene.add_frame("/joints", show_axes=False, position=PLACE, visible=False)
+        self._cells = scene.add_frame("/joints/cells", show_axes=False, visible=False)
+        self._meshes = {name: _mesh(scene, name) for name in NAMES}
+        self._legend_root = scene.add_frame("/joints/cells/legend", show_axes=False)
+        self._legend = [_legend(scene, name, k) for k, name in enumerate(NAMES)]
         self._star = scene.add_icosphere(
-            "/joints/star", radius=0.09, color=palette.TEXT, subdivisions=2, cast_shadow=False
+            "/joints/cells/star", STAR, (255, 255, 255), subdivisions=3, cast_shadow=False
         )
-        self._title = scene.add_label(
-            "/joints/title", label, font_screen_scale=1.3, anchor="bottom-center",
-            position=(SIZE / 2, SIZE / 2, SIZE + 0.5),
-        )  # fmt: skip
-        self._ticks = _axis_labels(scene)
-        self._volume: Array | None = None
-        self._stale = False
-        self._drawn = -math.inf
-        self._limits: Array | None = None
+        self._outline = scene.add_icosphere(
+            "/joints/cells/star/outline", 1.35 * STAR, (0, 0, 0), side="back", cast_shadow=False
+        )
+        # Words are never hidden by cells: they tell where the star is behind them.
+        scene.add_label(
+            "/joints/cells/star/name",
+            label,
+            position=(0.0, 0.0, 2.4 * STAR),
+            font_screen_scale=0.9,
+            anchor="bottom-center",
+        )
+        self._plumb = _lines(scene, "plumb", 1.2, palette.SECONDARY)
+        self._bars = _lines(scene, "now", 4.5, palette.TEXT)
+        self._full = _lines(scene, "full", 1.4, palette.TEXT)
+        self._title = Words(
+            scene.add_label(
+                "/joints/title", "", position=TITLE, font_screen_scale=1.7, anchor="bottom-center"
+            )
+        )
+        self._image: OwnImage | None = None
+        self._edges: np.ndarray | None = None
+        self._meshed: np.ndarray | None = None  # the volume that the surfaces show
+        self._meshed_at = -math.inf
+        self._old = False
 
     def remove(self) -> None:
         """Take all of it out of the browser."""
         self._scene.remove_by_name("/joints")
 
-    def update(self, image: OwnImage | None, now: float, shown: bool) -> None:
-        """now: on the clock of the image's state time [s]; shown: this browser looks at it."""
-        self._root.visible = shown
-        if not shown:
+    def update(self, image: OwnImage | None, state_now: float, now: float, looked_at: bool) -> None:
+        """state_now: on the clock of the image's state time; now: a monotonic clock [s]."""
+        self._root.visible = looked_at
+        if not looked_at:
             return
+        self._cells.visible = image is not None
         if image is None:
-            self._title.text = f"{self._label} · no image yet"
+            self._title.show(f"{self._label} · no joint image yet", None, now)
             return
-        age = now - image.state_time
-        stale = not age <= OLD
-        swing = math.degrees(float(image.q[0]))
-        mark = "STALE" if stale else "slice"
-        words = f"{self._label} at swing {swing:.0f}° · {mark} {max(age, 0.0):.1f} s old"
-        if self._title.text != words:
-            self._title.text = words
-        if now - self._drawn >= PERIOD or now < self._drawn:
-            self._drawn = now
-            self._draw_surfaces(image, stale)
-            self._draw_ticks(image.volume_edges)
-        self._draw_state(image)
+        age = state_now - image.state_time
+        old = not age <= OLD
+        if image is not self._image or old != self._old:
+            self._mark(image, old)
+        if image.volume is not self._meshed and (now - self._meshed_at >= PERIOD):
+            self._draw_cells(image, now)
+        if old != self._old:
+            self._old = old
+            self._paint()
+        self._image = image
+        swing = math.degrees(math.remainder(float(image.q[0]), math.tau))
+        self._title.show(title(self._label, swing, age, old), old, now)
 
-    def _draw_surfaces(self, image: OwnImage, stale: bool) -> None:
-        cells = image.volume
-        if stale != self._stale:
-            self._stale = stale
-            for node, (_, color) in zip(self._surfaces, LAYERS, strict=False):
-                node.color = palette.STALE if stale else color
-        if self._volume is not None and np.array_equal(cells, self._volume):
-            return
-        self._volume = cells
-        hits = (cells & HITS) != 0
-        undecided = (cells & (FREE | COLLIDING | HITS)) == 0
-        masks = [*layer_masks(cells, tuple(bit for bit, _ in LAYERS)), undecided]
-        scale = SIZE / np.array(cells.shape, dtype=np.float32)
-        for k, (node, mask) in enumerate(zip(self._surfaces, masks, strict=True)):
-            vertices, faces = exposed_faces(mask, hits if k < len(LAYERS) else hits | mask)
-            node.visible = len(faces) > 0
+    def _draw_cells(self, image: OwnImage, now: float) -> None:
+        if self._edges is None or not np.allclose(self._edges, image.volume_edges, atol=1e-6):
+            self._edges = image.volume_edges
+            self._scene.remove_by_name("/joints/cells/frame")
+            draw_frame(self._scene, "/joints/cells/frame", self._edges)
+        if self._meshed is None or not np.array_equal(self._meshed, image.volume):
+            self._send(surfaces(image.volume, SIZE))
+            self._meshed_at = now
+        self._meshed = image.volume
+
+    def _send(self, meshes: Meshes) -> None:
+        row = 0
+        for (name, (vertices, faces)), entry in zip(meshes.items(), self._legend, strict=True):
+            node = self._meshes[name]
+            node.visible = entry.visible = len(faces) > 0
             if len(faces):
-                node.vertices, node.faces = vertices * scale, faces
+                node.vertices, node.faces = vertices, faces
+                entry.position = legend_place(row)
+                row += 1
 
-    def _draw_state(self, image: OwnImage) -> None:
-        low, high = image.volume_edges[:, 0], image.volume_edges[:, 1]
-        scale = SIZE / (high - low)
-        here = (image.q[1:4] - low) * scale
-        self._star.position = tuple(float(v) for v in here)
-        walls = np.repeat(here[None, None], 2, axis=1).repeat(3, axis=0)
-        walls[np.arange(3), 1, np.arange(3)] = 0.0
-        self._walls.points = walls.astype(np.float32)
-        now = np.zeros((3, 2, 3)) + here
-        now[np.arange(3), 1, np.arange(3)] += image.stopping[1:4, 0] * scale
-        self._stops[0].points = now.astype(np.float32)
-        full = np.zeros((3, 2, 3)) + here
-        reach = image.stopping[1:4, 1] * scale
-        full[np.arange(3), 0, np.arange(3)] -= reach
-        full[np.arange(3), 1, np.arange(3)] += reach
-        self._stops[1].points = np.clip(full, 0.0, SIZE).astype(np.float32)
+    def _mark(self, image: OwnImage, old: bool) -> None:
+        q, stopping, edges = image.q[1:4], image.stopping[1:4], image.volume_edges
+        here = place(q, edges)
+        if not np.allclose(self._star.position, here, atol=1e-3):
+            self._star.position = here
+            _draw(self._plumb, plumb_lines(here), palette.SECONDARY)
+        points, colors = stop_bars(image.volume, edges, q, stopping[:, 0], old)
+        self._bars.visible = len(points) > 0
+        if len(points):
+            _draw(self._bars, points, colors)
+        _draw(self._full, full_box(edges, q, stopping[:, 1]), palette.TEXT)
 
-    def _draw_ticks(self, edges: Array) -> None:
-        if self._limits is not None and np.array_equal(edges, self._limits):
-            return
-        self._limits = edges
-        for k, (low, name, high) in enumerate(self._ticks):
-            low.text = f"{math.degrees(edges[k, 0]):.0f}°"
-            high.text = f"{math.degrees(edges[k, 1]):.0f}°"
-            name.text = f"{ARM[k + 1]} °"
+    def _paint(self) -> None:
+        for name, node in self._meshes.items():
+            node.color = palette.STALE if self._old else COLORS[name]
+            if name != UNDECIDED:
+                node.opacity = BODY_OLD if self._old else BODY
+        self._legend_root.visible = not self._old  # it would explain colours that are not there
+        self._star.color = palette.STALE if self._old else (255, 255, 255)
 
 
-def _axis_labels(scene: viser.SceneApi) -> list[tuple[viser.LabelHandle, ...]]:
-    """(lower limit, name, upper limit) along each axis of the box."""
-    labels = []
-    for k in range(3):
-        row = []
-        for share in (0.08, 0.5, 0.96):
-            at = np.full(3, -0.25)
-            at[k] = share * SIZE
-            row.append(
-                scene.add_label(
-                    f"/joints/axis{k}/{share}", ARM[k + 1], anchor="center-center", position=at
-                )
-            )
-        labels.append(tuple(row))
-    return labels
+def title(label: str, swing: float, age: float, old: bool) -> str:
+    """What the picture shows: whose joints, at which swing [deg], how old [s]."""
+    seconds = f"{max(age, 0.0):.1f} s" if math.isfinite(age) else ""
+    return f"{label} at swing {swing:.0f}° · {'STALE ' if old else ''}{seconds}".rstrip()
+
+
+def _mesh(scene: viser.SceneApi, name: str) -> viser.MeshHandle:
+    shell = name == UNDECIDED
+    return scene.add_mesh_simple(
+        f"/joints/cells/{name}",
+        np.array([[0, 0, 0], [1e-3, 0, 0], [0, 1e-3, 0]], dtype=np.float32),
+        np.array([[0, 1, 2]], dtype=np.uint32),
+        color=COLORS[name],
+        opacity=SHELL if shell else BODY,
+        side="double" if shell else "front",
+        flat_shading=True,
+        cast_shadow=False,
+        receive_shadow=False,
+        visible=False,
+    )
+
+
+def _legend(scene: viser.SceneApi, name: str, row: int) -> viser.FrameHandle:
+    root = f"/joints/cells/legend/{name}"
+    entry = scene.add_frame(root, show_axes=False, position=legend_place(row), visible=False)
+    scene.add_icosphere(f"{root}/sample", 0.11, COLORS[name], subdivisions=2, cast_shadow=False)
+    scene.add_label(
+        f"{root}/name",
+        name,
+        position=(0.18, 0.12, 0.0),
+        font_screen_scale=1.2,
+        anchor="center-left",
+    )
+    return entry
+
+
+def legend_place(row: int) -> tuple[float, float, float]:
+    """Right of the box, from above."""
+    return SIDE + 0.55, SIDE + 0.25, SIDE - 0.3 - 0.42 * row
 
 
 def _lines(
-    scene: viser.SceneApi, name: str, points: Float32, color: palette.Rgb, pixels: float
+    scene: viser.SceneApi, name: str, pixels: float, color: palette.Rgb
 ) -> viser.LineSegmentsHandle:
     return scene.add_line_segments(
-        f"/joints/{name}", points, palette.line(color), thickness=pixels, thickness_units="screen"
+        f"/joints/cells/{name}",
+        NO_LINE,
+        palette.each(color, NO_LINE),
+        thickness=pixels,
+        thickness_units="screen",
     )
+
+
+def _draw(node: viser.LineSegmentsHandle, points: Float32, colors: Any) -> None:
+    """New lines; colors: uint8 (k, 2, 3), or one colour."""
+    node.points = points
+    if not isinstance(colors, np.ndarray):
+        colors = palette.each(colors, points)
+    if not np.array_equal(node.colors, colors):
+        node.colors = colors

@@ -14,7 +14,7 @@ from backend.spatial.types import Array
 from cockpit.views import palette
 from cockpit.views.inputs import SceneMachine
 from cockpit.views.labels import Words, name_text, oldest
-from cockpit.views.shapes import circle, feature_edges, link_meshes
+from cockpit.views.shapes import circle
 
 STILL = 2e-4  # change of a pose's entries that is worth a message [m, -]
 GHOST = 0.5  # opacity of a stale machine
@@ -59,7 +59,7 @@ class MachineNodes:
         self._ghostly = False
 
     def _add_link(self, scene: viser.SceneApi, root: str, index: int, tint: palette.Rgb) -> None:
-        meshes = link_meshes(self._entry.model, index)
+        meshes, edges = self._entry.looks[index].meshes, self._entry.looks[index].edges
         if self._one_color:
             meshes = [(vertices, faces, None) for vertices, faces, _ in meshes]
         if not meshes:
@@ -78,7 +78,6 @@ class MachineNodes:
                 receive_shadow=False,
             )
             self._paint.append((handle, color))
-        edges = np.concatenate([feature_edges(vertices, faces) for vertices, faces, _ in meshes])
         if len(edges):
             _lines(scene, f"{root}/edges", edges, palette.EDGE, 1.2)
 

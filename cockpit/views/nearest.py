@@ -10,6 +10,7 @@ from backend.safety.record import Level
 from cockpit.views import palette
 from cockpit.views.inputs import SceneSite
 from cockpit.views.labels import Words, distance_text, pair_level
+from cockpit.views.shapes import NO_LINE
 
 WIDTH: dict[Level, float] = {Level.CLEAR: 2.0, Level.SLOW: 4.0, Level.STOP: 6.0}
 
@@ -48,7 +49,7 @@ class PairNodes:
         line, words = self._nodes(key)
         line.visible = level is not Level.UNKNOWN
         if level is not self._levels.get(key):
-            line.colors = np.broadcast_to(np.uint8(palette.line(palette.LEVEL[level])), (1, 2, 3))
+            line.colors = palette.each(palette.LEVEL[level], line.points)
             line.thickness = WIDTH.get(level, 2.0)
             self._levels[key] = level
         if np.abs(line.points[0] - points).max() > 5e-4:
@@ -67,8 +68,8 @@ class PairNodes:
             name = f"/nearest/{key[0]} {key[1]}"
             line = self._scene.add_line_segments(
                 f"{name}/line",
-                np.zeros((1, 2, 3), dtype=np.float32),
-                palette.SECONDARY,
+                NO_LINE,
+                palette.each(palette.SECONDARY, NO_LINE),
                 thickness=2.0,
                 thickness_units="screen",
             )

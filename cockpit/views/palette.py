@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import numpy as np
+from numpy.typing import NDArray
+
 from backend.safety.record import Level
 
 Rgb = tuple[int, int, int]
@@ -25,6 +28,10 @@ REACH_MAX = rgb("#94A6B4")
 PARTNER = rgb("#A970F0")
 SITE = rgb("#3E8E78")
 SELF = rgb("#C0B8D9")
+UNDECIDED = rgb("#8A949E")
+BLOCKED = rgb("#FF6B5E")  # a stopping distance that does not end in what is certified free
+GHOST = rgb("#DDE4EA")  # what a machine would look like
+GHOST_HIT = rgb("#E0655E")  # and would touch something
 STALE = rgb("#8A949E")
 EDGE = rgb("#0B0F13")
 PAINT = rgb("#D8D8D8")  # of machines described without colours; tinted when drawn
@@ -51,6 +58,15 @@ def line(color: Rgb) -> Rgb:
     """What to send for a line so that it shows in `color`: viser takes vertex colours as linear."""
     linear = [((c / 255.0 + 0.055) / 1.055) ** 2.4 if c > 10 else c / 255.0 / 12.92 for c in color]
     return round(255 * linear[0]), round(255 * linear[1]), round(255 * linear[2])
+
+
+def each(color: Rgb, points: NDArray[np.float32]) -> NDArray[np.uint8]:
+    """`line` for every end of lines `points` (k, 2, 3), as uint8 (k, 2, 3).
+
+    Lines whose colour changes later are made with this: the browser shows a line that was made
+    with a single colour in white once it gets one for each end.
+    """
+    return np.broadcast_to(np.array(line(color), dtype=np.uint8), points.shape)
 
 
 def tint(color: Rgb, machine_tint: Rgb) -> Rgb:

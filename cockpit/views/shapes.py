@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -28,6 +29,20 @@ BOX_FACES: UInt32 = np.array(
     dtype=np.uint32,
 )
 
+# What a node of lines is made with before there is anything to draw.
+NO_LINE: Float32 = np.zeros((1, 2, 3), dtype=np.float32)
+
+# The twelve edges of the unit cube, (12, 2, 3).
+BOX_EDGES: Float32 = np.array(
+    [
+        np.roll([[0, u, v], [1, u, v]], axis, axis=1)
+        for axis in range(3)
+        for u in (0, 1)
+        for v in (0, 1)
+    ],
+    dtype=np.float32,
+)
+
 
 def box_mesh(boxes: Boxes) -> tuple[Float32, UInt32]:
     """Vertices (8n, 3) and faces (12n, 3) of n boxes in their common frame."""
@@ -48,6 +63,21 @@ def link_meshes(machine: Machine, link: int) -> list[tuple[Float32, UInt32, Rgb 
         return [(*_joined(parts), color) for color, parts in by_color.items()]
     bodies = [k for k, owner in enumerate(machine.body_links) if owner == link]
     return [(*box_mesh(machine.bodies.take(bodies)), None)] if bodies else []
+
+
+@dataclass(frozen=True)
+class LinkLooks:
+    """One mesh per colour of a link (see `link_meshes`), and its sharp edges (k, 2, 3) [m]."""
+
+    meshes: list[tuple[Float32, UInt32, Rgb | None]]
+    edges: Float32
+
+
+def link_looks(machine: Machine, link: int) -> LinkLooks:
+    """In the link's frame."""
+    meshes = link_meshes(machine, link)
+    edges = [feature_edges(vertices, faces) for vertices, faces, _ in meshes]
+    return LinkLooks(meshes, np.concatenate([NO_LINE[:0], *edges]))
 
 
 def _joined(parts: list[tuple[Array, Any]]) -> tuple[Float32, UInt32]:
@@ -85,26 +115,52 @@ def polyline(points: Array, closed: bool, z: float = 0.0) -> Float32:
     return np.stack([flat if closed else flat[:-1], ends], axis=1).astype(np.float32)
 
 
+def dashed(ring: Array, on: float, off: float) -> Float32:
+    """A closed outline (n, 2), not closed itself, as dashes that bend with it: (k, 2, 3).
+
+    on, off: lengths of dashes and gaps [m], fitted to whole dashes around the outline.
+    """
+    closed = np.concatenate([ring, ring[:1]])
+    lengths = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(closed, axis=0), axis=1))])
+    if not lengths[-1] > 0.0:
+        return np.zeros((0, 2, 3), dtype=np.float32)
+    count = max(1, round(lengths[-1] / (on + off)))
+    period = lengths[-1] / count
+    starts = period * np.arange(count)
+    drawn = period * on / (on + off)
+    knots = np.unique(np.concatenate([lengths, starts, starts + drawn]))
+    knots = knots[np.diff(knots, prepend=-1.0) > 1e-9]
+    points = np.column_stack([np.interp(knots, lengths, closed[:, k]) for k in (0, 1)])
+    middle = (knots[:-1] + knots[1:]) / 2.0
+    return polyline(points, closed=False)[middle % period < drawn]
+
+
+def rings(geometry: BaseGeometry | None) -> list[Array]:
+    """Every outline (n, 2) of the polygons in a geometry, holes too, not closed."""
+    found = []
+    for part in shapely.get_parts(geometry):
+        if isinstance(part, shapely.Polygon) and not part.is_empty:
+            found += [np.asarray(ring.coords)[:-1, :2] for ring in (part.exterior, *part.interiors)]
+    return found
+
+
 def filled(polygon: Array) -> tuple[Float32, UInt32]:
     """Triangles of a polygon's inside, normals up: vertices (n, 3) at z = 0, faces (m, 3).
 
     polygon: (k, 2), not closed; one that crosses itself is repaired first. Nothing for zero area.
     """
     if len(polygon) < 3 or not np.isfinite(polygon).all():
-        return filled_area(shapely.Polygon())
-    return filled_area(shapely.make_valid(shapely.Polygon(polygon)))
+        return _NOTHING
+    return filled_geometry(shapely.make_valid(shapely.Polygon(polygon)))
 
 
-def filled_area(area: BaseGeometry) -> tuple[Float32, UInt32]:
-    """The same of any polygons, with holes."""
-    triangles = [
-        np.asarray(part.exterior.coords)[:3]
-        for part in shapely.get_parts(shapely.constrained_delaunay_triangles(area))
-        if part.area > 0.0
-    ]
-    if not triangles:
-        return np.zeros((0, 3), dtype=np.float32), np.zeros((0, 3), dtype=np.uint32)
-    corners = np.stack(triangles)
+def filled_geometry(shape: BaseGeometry) -> tuple[Float32, UInt32]:
+    """Triangles of a valid geometry's polygons, their holes left open; as `filled`."""
+    triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(shape))
+    triangles = triangles[shapely.area(triangles) > 0.0]
+    if not len(triangles):
+        return _NOTHING
+    corners = shapely.get_coordinates(triangles).reshape(-1, 4, 2)[:, :3].copy()
     u, v = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     clockwise = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0] < 0.0
     corners[clockwise] = corners[clockwise][:, ::-1]
@@ -112,22 +168,4 @@ def filled_area(area: BaseGeometry) -> tuple[Float32, UInt32]:
     return flat.astype(np.float32), np.arange(len(flat), dtype=np.uint32).reshape(-1, 3)
 
 
-def outline(area: BaseGeometry, dash: float = 0.0) -> Float32:
-    """Line segments (k, 2, 3) along all rings of polygons at z = 0.
-
-    dash: length of dashes and of the gaps between them [m]; 0 for a solid line.
-    """
-    segments = []
-    for ring in shapely.get_parts(shapely.boundary(area)):
-        points = shapely.get_coordinates(ring)
-        if dash > 0.0:
-            count = max(2 * round(ring.length / (2.0 * dash)), 4)
-            along = np.linspace(0.0, 1.0, count + 1)
-            points = shapely.get_coordinates(
-                shapely.line_interpolate_point(ring, along, normalized=True)
-            )
-        lines = np.stack([points[:-1], points[1:]], axis=1)
-        segments.append(lines[::2] if dash > 0.0 else lines)
-    if not segments:
-        return np.zeros((0, 2, 3), dtype=np.float32)
-    return np.pad(np.concatenate(segments), ((0, 0), (0, 0), (0, 1))).astype(np.float32)
+_NOTHING = np.zeros((0, 3), dtype=np.float32), np.zeros((0, 3), dtype=np.uint32)

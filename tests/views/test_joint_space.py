@@ -1,165 +1,205 @@
-"""The joint-space view, the ghost and the exact zones: geometry, and nodes on a real server."""
+"""The joint-space view on a real server: made once, sent again only when it changed."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-import shapely
 import toy_site as toy
-import trimesh
 import viser
+from viewing import counted, handle
 
-from backend.cspace.cells import COLLIDING, FREE, PARTNER, SELF, SITE
-from backend.cspace.driving import Exit
-from backend.machine.kinematics import link_poses
-from backend.pipeline.zones import ZoneImage
+from backend.cspace.cells import FREE, PARTNER, SITE
 from cockpit.views import palette
-from cockpit.views.cameras import camera_pose
-from cockpit.views.cell_surface import exposed_faces, layer_masks
-from cockpit.views.ghost import GhostNodes
-from cockpit.views.joint_space import ORIGIN, SIZE, JointSpaceNodes
-from cockpit.views.server import open_server
-from cockpit.views.shapes import filled_area, outline
-from cockpit.views.zone import ZoneNodes
+from cockpit.views.browser import Browser
+from cockpit.views.joint_frame import PLACE, place
+from cockpit.views.joint_space import BODY, JointSpace, title
+from cockpit.views.server import start
+
+CELLS = "/joints/cells"
 
 
-@pytest.fixture
-def server() -> Iterator[viser.ViserServer]:
-    made = open_server()
-    yield made
-    made.stop()
+def volume(partner: int = 4) -> np.ndarray:
+    cells = np.full((8, 8, 8), FREE, dtype=np.uint8)
+    cells[:partner] = PARTNER
+    cells[:, :, 0] = SITE
+    cells[partner] &= ~np.uint8(FREE)
+    return cells
 
 
-def exact_image(state_time: float = 10.0, seed: int = 0) -> SimpleNamespace:
-    rng = np.random.default_rng(seed)
-    cells = rng.choice(np.array([FREE, PARTNER | COLLIDING, SITE, SELF, 0], np.uint8), (6, 5, 4))
-    return SimpleNamespace(
-        state_time=state_time,
-        q=np.array([0.5, 0.1, -1.0, 0.2]),
-        volume=cells,
-        volume_edges=np.array([[-0.5, 1.0], [-2.0, -0.5], [-1.0, 1.0]]),
-        stopping=np.array([[0.0, 0.3], [0.1, 0.2], [-0.1, 0.2], [0.0, 0.2]]),
-    )
+def triangles(server: viser.ViserServer, name: str) -> int:
+    node = handle(server, f"{CELLS}/{name}")
+    return len(node.faces) if node.visible else 0
 
 
-def test_exposed_faces_close_the_solid_and_face_outwards() -> None:
-    solid = np.zeros((6, 7, 5), dtype=bool)
-    solid[1:4, 2:6, 1:4] = True
-    solid[2, 3, 2] = False  # a hole inside
-    mesh = trimesh.Trimesh(*exposed_faces(solid, solid))
-    mesh.merge_vertices()
-    assert mesh.is_watertight
-    assert mesh.volume == pytest.approx(solid.sum())
+def test_nodes_are_made_once_and_then_changed(server: viser.ViserServer) -> None:
+    space = JointSpace(server.scene, "LEFT")
+    space.update(toy.own_image(volume(4), 0.0), 0.1, 0.1, looked_at=True)
+    assert handle(server, "/joints").visible
+    np.testing.assert_allclose(handle(server, "/joints").position, PLACE)
+    assert triangles(server, "partner") > 0
+    assert triangles(server, "site") > 0
+    assert triangles(server, "undecided") > 0
+    assert triangles(server, "self") == triangles(server, "other") == 0
+    assert handle(server, f"{CELLS}/partner").color == palette.PARTNER
+    assert handle(server, f"{CELLS}/site").color == palette.SITE
+    assert not handle(server, f"{CELLS}/legend/self").visible
+    assert handle(server, "/joints/title").text == "LEFT at swing 29° · 0.1 s"
+
+    vertices = handle(server, f"{CELLS}/partner").vertices.copy()
+    later = toy.own_image(volume(5), 0.4)
+    sent = counted(server, lambda: space.update(later, 0.5, 0.5, looked_at=True))
+    assert set(sent) == {"SceneNodeUpdateMessage"}
+    assert not np.array_equal(handle(server, f"{CELLS}/partner").vertices, vertices)
 
 
-def test_faces_are_counted_as_by_hand() -> None:
-    rng = np.random.default_rng(1)
-    shown = rng.uniform(size=(5, 4, 6)) < 0.3
-    solid = shown | (rng.uniform(size=shown.shape) < 0.3)
-    count = 0
-    for cell in np.argwhere(shown):
-        for axis in range(3):
-            for side in (-1, 1):
-                there = cell.copy()
-                there[axis] += side
-                inside = ((there >= 0) & (there < shown.shape)).all()
-                count += not (inside and solid[tuple(there)])
-    vertices, faces = exposed_faces(shown, solid)
-    assert (len(vertices), len(faces)) == (4 * count, 2 * count)
+def test_the_same_cells_are_not_sent_again(server: viser.ViserServer) -> None:
+    space = JointSpace(server.scene, "LEFT")
+    cells = volume()
+    image = toy.own_image(cells, 0.0)
+    space.update(image, 0.1, 0.0, looked_at=True)
+    assert not counted(server, lambda: space.update(image, 0.11, 0.04, looked_at=True))
+    again = toy.own_image(cells.copy(), 0.1)
+    assert not counted(server, lambda: space.update(again, 0.2, 0.3, looked_at=True))
+    moved = toy.own_image(cells.copy(), 0.2, q=(0.5, 0.1, -0.5, 0.5))
+    sent = counted(server, lambda: space.update(moved, 0.3, 0.6, looked_at=True))
+    assert sent["SetPositionMessage"] == 1
+    assert sent["SceneNodeUpdateMessage"] == 3  # lines to the walls, bars, box
+    here = place(moved.q[1:4], moved.volume_edges)
+    np.testing.assert_allclose(handle(server, f"{CELLS}/star").position, here)
 
 
-def test_a_cell_that_hits_several_is_drawn_as_the_first() -> None:
-    cells = np.array([PARTNER | SELF, SITE | SELF, SELF, FREE], dtype=np.uint8)
-    masks = layer_masks(cells, (PARTNER, SITE, SELF))
-    assert [mask.tolist() for mask in masks] == [
-        [True, False, False, False],
-        [False, True, False, False],
-        [False, False, True, False],
-    ]
+def test_surfaces_are_sent_at_most_five_times_a_second(server: viser.ViserServer) -> None:
+    space = JointSpace(server.scene, "LEFT")
+    changes, before = 0, None
+    for step in range(26):  # one second of a view at 25 Hz, each time with another image
+        now = 0.04 * step
+        space.update(toy.own_image(volume(3 + step % 2), now), now, now, looked_at=True)
+        vertices = handle(server, f"{CELLS}/partner").vertices
+        changes += before is None or not np.array_equal(before, vertices)
+        before = vertices.copy()
+    assert 3 <= changes <= 6
 
 
-def node(server: viser.ViserServer, name: str) -> viser.SceneNodeHandle:
-    found = server.scene.get_handle_by_name(name)
-    assert found is not None, name
-    return found
+def test_the_last_image_is_shown_even_if_it_came_too_soon(server: viser.ViserServer) -> None:
+    space = JointSpace(server.scene, "LEFT")
+    space.update(toy.own_image(volume(2), 0.0), 0.0, 0.0, looked_at=True)
+    last = toy.own_image(volume(6), 0.1)
+    space.update(last, 0.1, 0.1, looked_at=True)
+    few = triangles(server, "partner")
+    space.update(last, 0.3, 0.3, looked_at=True)
+    assert triangles(server, "partner") > few
 
 
-def test_the_view_shows_the_image_only_to_who_looks(server: viser.ViserServer) -> None:
-    nodes = JointSpaceNodes(server.scene, "LEFT")
-    image = exact_image()
-    nodes.update(image, 10.1, shown=False)
-    assert not node(server, "/joints").visible
-    nodes.update(image, 10.2, shown=True)
-    assert node(server, "/joints").visible
-    for bit, color in ((PARTNER, palette.PARTNER), (SITE, palette.SITE), (SELF, palette.SELF)):
-        mesh = node(server, f"/joints/layer{bit}")
-        assert mesh.visible
-        assert mesh.color == color
-        vertices, _ = exposed_faces((image.volume & bit) != 0, (image.volume & 7) != 0)
-        assert len(mesh.vertices) == len(vertices)
-        assert mesh.vertices.max() <= SIZE
-    star = np.array(node(server, "/joints/star").position)
-    np.testing.assert_allclose(star, SIZE * np.array([0.6 / 1.5, 1.0 / 1.5, 1.2 / 2.0]))
-    assert node(server, "/joints/title").text == "LEFT at swing 29° · slice 0.2 s old"
-    now = node(server, "/joints/stop-now").points
-    np.testing.assert_allclose(now[0, 1] - now[0, 0], [0.1 * SIZE / 1.5, 0, 0], atol=1e-6)
+def test_nothing_is_sent_while_nobody_looks(server: viser.ViserServer) -> None:
+    space = JointSpace(server.scene, "LEFT")
+    space.update(toy.own_image(volume(), 0.0), 0.0, 0.0, looked_at=True)
+    space.update(None, 0.1, 0.1, looked_at=False)
+    assert not handle(server, "/joints").visible
+    image = toy.own_image(volume(6), 1.0)
+    assert not counted(server, lambda: space.update(image, 1.0, 1.0, looked_at=False))
+    space.update(image, 1.1, 1.1, looked_at=True)
+    assert handle(server, "/joints").visible
 
 
-def test_the_view_says_stale(server: viser.ViserServer) -> None:
-    nodes = JointSpaceNodes(server.scene, "LEFT")
-    nodes.update(None, 10.0, shown=True)
-    assert "no image" in node(server, "/joints/title").text
-    nodes.update(exact_image(), 10.1, shown=True)
-    nodes.update(exact_image(seed=0), 12.0, shown=True)
-    assert "STALE 2.0 s" in node(server, "/joints/title").text
-    assert node(server, f"/joints/layer{PARTNER}").color == palette.STALE
-    nodes.update(exact_image(12.4, seed=0), 12.5, shown=True)
-    assert node(server, f"/joints/layer{PARTNER}").color == palette.PARTNER
+def test_an_old_image_is_grey_and_says_so(server: viser.ViserServer) -> None:
+    space = JointSpace(server.scene, "LEFT")
+    image = toy.own_image(volume(), 0.0)
+    space.update(image, 0.9, 0.9, looked_at=True)
+    partner, star = (handle(server, f"{CELLS}/{name}") for name in ("partner", "star"))
+    assert (partner.color, partner.opacity) == (palette.PARTNER, BODY)
+    space.update(image, 1.4, 1.4, looked_at=True)
+    assert handle(server, "/joints/title").text == "LEFT at swing 29° · STALE 1.4 s"
+    assert partner.color == star.color == palette.STALE
+    assert not handle(server, f"{CELLS}/legend").visible
+    bars = handle(server, f"{CELLS}/now")
+    assert tuple(bars.colors[0, 0]) == palette.line(palette.STALE)
+
+    space.update(toy.own_image(volume(), 1.5), 1.6, 1.6, looked_at=True)
+    assert handle(server, "/joints/title").text == "LEFT at swing 29° · 0.1 s"
+    assert partner.color == palette.PARTNER
+    assert handle(server, f"{CELLS}/legend").visible
+    assert tuple(bars.colors[0, 0]) != palette.line(palette.STALE)
 
 
-def test_the_camera_looks_at_the_box() -> None:
-    pose = camera_pose("joints", toy.site(), toy.snapshot(), "left")
-    middle = np.array(ORIGIN) + SIZE / 2
-    assert np.linalg.norm(pose.look_at - middle) < 0.1 * SIZE
-    assert np.linalg.norm(pose.position - middle) > SIZE
+def test_without_an_image_it_says_so(server: viser.ViserServer) -> None:
+    space = JointSpace(server.scene, "LEFT")
+    space.update(None, 0.0, 0.0, looked_at=True)
+    assert "no joint image" in handle(server, "/joints/title").text
+    assert not handle(server, CELLS).visible
 
 
-def test_a_ghost_stands_on_the_machines_base(server: viser.ViserServer) -> None:
-    site, snapshot = toy.site(), toy.snapshot(swing=0.2)
-    ghost = GhostNodes(server.scene, "left", site.machines["left"])
-    state = snapshot.machines["left"]
-    ghost.update(state)
-    assert not node(server, "/ghost").visible
-    ghost.joints = np.array([0.4, 0.3, -0.8, 0.1])
-    ghost.update(state)
-    assert node(server, "/ghost").visible
-    assert node(server, "/ghost/name").text == "WHAT IF · LEFT"
-    expected = link_poses(site.machines["left"].model, ghost.joints, state.body.link_poses[0])
-    np.testing.assert_allclose(node(server, "/ghost/3").position, expected[3, :3, 3], atol=1e-9)
-    assert node(server, "/ghost/1/0").opacity < 0.5
-    ghost.remove()
-    assert server.scene.get_handle_by_name("/ghost") is None
+def test_the_axes_carry_their_names_and_limits(server: viser.ViserServer) -> None:
+    space = JointSpace(server.scene, "LEFT")
+    space.update(toy.own_image(volume(), 0.0), 0.0, 0.0, looked_at=True)
+    for joint in ("boom", "stick", "bucket"):
+        assert handle(server, f"{CELLS}/frame/{joint}/name").text == f"{joint} °"
+    assert handle(server, f"{CELLS}/frame/boom/30").text == "30"
+    assert server.scene.get_handle_by_name(f"{CELLS}/frame/boom/90") is None
 
 
-def test_exact_zones_keep_their_holes_and_tell_variants_apart(server: viser.ViserServer) -> None:
-    square = shapely.box(0, 0, 6, 6).difference(shapely.box(2, 2, 3, 3))
-    vertices, faces = filled_area(square)
-    a, b, c = np.moveaxis(vertices[faces], 1, 0)
-    assert np.cross(b - a, c - a)[:, 2].sum() / 2 == pytest.approx(35.0)
-    solid, dashed = outline(square), outline(square, 0.2)
-    assert np.linalg.norm(solid[:, 1] - solid[:, 0], axis=1).sum() == pytest.approx(28.0)
-    assert np.linalg.norm(dashed[:, 1] - dashed[:, 0], axis=1).sum() == pytest.approx(14.0, rel=0.1)
-    variants = {"as_is": square, "any_swing": square.buffer(1), "any_posture": square.buffer(2)}
-    exits = {name: Exit(1.0, np.array([1.0, 0.0]), 0.0) for name in variants}
-    image = ZoneImage("left", "right", 5.0, np.zeros(2), 0.1, variants, exits)
-    nodes = ZoneNodes(server.scene, "/zone")
-    nodes.update(image, 5.5, 0.0)
-    for name in ("fill", "edge", "any_swing", "any_posture"):
-        assert node(server, f"/zone/{name}").visible
-    nodes.update(image, 8.0, 0.0)
-    assert not node(server, "/zone/fill").visible
-    nodes.update(None, 8.0, 0.0)
-    assert not node(server, "/zone").visible
+@pytest.mark.parametrize(
+    ("age", "old", "words"),
+    [
+        (0.24, False, "LEFT at swing 30° · 0.2 s"),
+        (1.44, True, "LEFT at swing 30° · STALE 1.4 s"),
+        (float("nan"), True, "LEFT at swing 30° · STALE"),
+        (-0.02, False, "LEFT at swing 30° · 0.0 s"),
+    ],
+)
+def test_titles(age: float, old: bool, words: str) -> None:
+    assert title("LEFT", 30.2, age, old) == words
+
+
+def browser(server: viser.ViserServer, camera: str) -> Browser:
+    client = SimpleNamespace(scene=server.scene, atomic=server.atomic)
+    return Browser(client, toy.site(), "left", camera, "exact")  # type: ignore[arg-type]
+
+
+def test_a_browser_makes_it_at_the_first_look(server: viser.ViserServer) -> None:
+    source, snapshot = toy.Source(), toy.snapshot(time=10.0)
+    source.images[("exact", "left")] = toy.own_image(volume(), 9.9)
+    window = browser(server, "site")
+    window.update(snapshot, source, 0.0, 0.0, 0.0)
+    assert server.scene.get_handle_by_name("/joints") is None
+    window.camera = "joints"
+    window.update(snapshot, source, 0.0, 0.1, 0.0)
+    assert handle(server, "/joints").visible
+    window.camera = "plan"
+    window.update(snapshot, source, 0.0, 0.2, 0.0)
+    assert not handle(server, "/joints").visible
+
+
+def test_another_own_machine_starts_from_nothing(server: viser.ViserServer) -> None:
+    source, snapshot = toy.Source(), toy.snapshot(time=10.0)
+    source.images[("exact", "left")] = toy.own_image(volume(), 9.9)
+    window = browser(server, "joints")
+    window.update(snapshot, source, 0.0, 0.0, 0.0)
+    window.own = "right"
+    assert server.scene.get_handle_by_name("/joints") is None
+    window.update(snapshot, source, 0.0, 0.1, 0.0)
+    assert handle(server, "/joints/title").text == "RIGHT · no joint image yet"
+    window.own = "left"
+    window.update(snapshot, source, 0.0, 0.2, 0.0)
+    assert handle(server, f"{CELLS}/partner").visible
+
+
+def test_windows_that_come_later_look_there_too() -> None:
+    source = toy.Source()
+    source.put(toy.snapshot())
+    view = start(toy.site(), source)
+    try:
+        view.set_camera("joints")
+        look_at = np.array(view._server.initial_camera.look_at)
+        np.testing.assert_allclose(look_at[:2], np.array(PLACE)[:2] + 2.0)
+        assert look_at[2] < -1000.0
+    finally:
+        view.stop()
+
+
+def test_the_swing_is_within_half_a_turn(server: viser.ViserServer) -> None:
+    space = JointSpace(server.scene, "LEFT")
+    image = toy.own_image(volume(), 0.0, q=(2 * np.pi - 0.5, 0.0, -0.5, 0.5))
+    space.update(image, 0.1, 0.1, looked_at=True)
+    assert handle(server, "/joints/title").text == "LEFT at swing -29° · 0.1 s"

@@ -5,13 +5,13 @@ from __future__ import annotations
 import dataclasses
 import socket
 import time
-from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import numpy as np
 import pytest
 import toy_site as toy
 import viser
+from viewing import counted, handle, until
 from viser import _messages
 
 from backend.fusion.pose import Validity
@@ -21,34 +21,6 @@ from cockpit.views import palette
 from cockpit.views.scene import Scene
 from cockpit.views.server import View, open_server, start
 from cockpit.views.zone import OwnNodes
-
-
-@pytest.fixture
-def server() -> Iterator[viser.ViserServer]:
-    made = open_server()
-    yield made
-    made.stop()
-
-
-def handle(server: viser.ViserServer, name: str) -> viser.SceneNodeHandle:
-    found = server.scene.get_handle_by_name(name)
-    assert found is not None, name
-    return found
-
-
-def counted(server: viser.ViserServer, act: Callable[[], None]) -> Counter[str]:
-    """Messages queued for all browsers while `act` runs, by type."""
-    sent: Counter[str] = Counter()
-    plain = server._websock_server.queue_message
-
-    def queue(message: _messages.Message) -> None:
-        sent[type(message).__name__] += 1
-        plain(message)
-
-    server._websock_server.queue_message = queue  # type: ignore[method-assign]
-    act()
-    server._websock_server.queue_message = plain  # type: ignore[method-assign]
-    return sent
 
 
 def test_only_the_loopback_and_no_tunnel(server: viser.ViserServer) -> None:
@@ -232,13 +204,6 @@ def running() -> Iterator[tuple[View, toy.Source]]:
     view = start(toy.site(), source)
     yield view, source
     view.stop()
-
-
-def until(true: Callable[[], bool], seconds: float = 5.0) -> bool:
-    end = time.monotonic() + seconds
-    while time.monotonic() < end and not true():
-        time.sleep(0.02)
-    return true()
 
 
 def test_the_thread_takes_the_newest_snapshot(running: tuple[View, toy.Source]) -> None:

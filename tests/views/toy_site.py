@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
+import shapely
 
 from backend.fusion.pose import FusedPose, StreamStatus, Validity
 from backend.fusion.samples import Fix
 from backend.machine.model import Antenna, ArmPlane, Joint, Link, Machine, SunMap, Tracks, Visual
+from backend.pipeline.exact import OwnImage
 from backend.pipeline.records import Body3D, Health, MachineState, PairDistance, Snapshot
 from backend.safety.record import Concern, Evidence, Level
 from backend.spatial.boxes import Boxes
@@ -202,12 +204,40 @@ def ring_zone(center: tuple[float, float] = (1.5, 0.4), radius: float = 3.2) -> 
     return np.concatenate([arc + center, -arc + (np.array(center) - [1.4, 0.0])])
 
 
+class ExactZone:
+    """An exact zone of an ordered pair, as far as the ground shows it."""
+
+    def __init__(self, state_time: float = 0.0, **zones: shapely.Geometry | None) -> None:
+        self.zones = zones
+        self.state_time = state_time
+
+
+def own_image(
+    volume: np.ndarray, state_time: float = 0.0, q: tuple = (0.5, 0.0, -0.5, 0.5)
+) -> OwnImage:
+    """Joint images of LEFT over boom -1..1, stick -2..1, bucket -1..2 rad; it slowly raises."""
+    return OwnImage(
+        own="left",
+        partners=("right",),
+        state_time=state_time,
+        eta=0.1,
+        q=np.array(q),
+        slices=(),
+        bars=(),
+        volume=volume,
+        volume_edges=np.array([[-1.0, 1.0], [-2.0, 1.0], [-1.0, 2.0]]),
+        reach=None,  # type: ignore[arg-type]
+        tip_height=None,
+        stopping=np.array([[0.0, 0.3], [0.1, 0.4], [-0.1, 0.4], [0.0, 0.5]]),
+    )
+
+
 class Source:
     """A hub of one fixed sequence: `put` publishes."""
 
     def __init__(self) -> None:
         self.current: Snapshot | None = None
-        self.images: dict[tuple[str, str], Zone] = {}
+        self.images: dict[tuple[str, str], object] = {}
 
     def put(self, value: Snapshot) -> None:
         self.current = value
@@ -225,5 +255,5 @@ class Source:
             time.sleep(0.004)
         return None
 
-    def image(self, kind: str, key: str) -> Zone | None:
+    def image(self, kind: str, key: str) -> object:
         return self.images.get((kind, key))
