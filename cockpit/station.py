@@ -32,12 +32,13 @@ from backend.shell.app.server import WebServer, bind
 from backend.shell.app.viewer_proxy import Hooks, viewer_router
 from backend.shell.app.wire import dumps
 from backend.shell.hub import Hub
-from backend.shell.kinds import image_kinds
+from backend.shell.image_worker import ImageWorker
+from backend.shell.kinds import EXACT, REGIONS, SUN, ZONE, Recipe, Wishes
 from backend.shell.link.receiver import Receiver
 from backend.shell.link.relay import Relay
 from backend.shell.link.session import open_session
 from backend.shell.link.source import LinkSource
-from backend.shell.runner import Runner
+from backend.shell.runner import ImageLoop, Runner
 from backend.site.bodies import site_bodies
 from backend.site.site import Site
 from backend.spatial.types import Array
@@ -45,6 +46,9 @@ from cockpit.views.inputs import scene_site
 from cockpit.views.server import HEAD, View, start
 
 MAX_HEIGHT = 50.0  # of a picked bucket tip above or below the swing joint [m]
+_LOOPS = (("images", (SUN, EXACT), "image_hz"), ("zones", (ZONE, REGIONS), "zone_hz"))
+"""Name, kinds, and which of the site's rates; each loop has a process of its own."""
+
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
 
 
@@ -136,16 +140,13 @@ class Station:
         prefixes = {machine.prefix: machine.name for machine in site.machines}
         self.receiver = Receiver(session, prefixes)
         self._closing.callback(self.receiver.close)
-        kinds = image_kinds(
-            self.config,
-            SunParameters(site.sun.m, site.sun.n, site.sun.eta),
-            site.rates.image_hz,
-            site.rates.zone_hz,
-            self._tip_heights.get,
-        )
-        self._hz = (site.rates.image_hz, site.rates.zone_hz)
         self.runner = Runner(
-            self.config, kinds, LinkSource(self.receiver), self.hub, site.rates.step_hz
+            self.config,
+            [self._image_loop(*loop, site) for loop in _LOOPS],
+            LinkSource(self.receiver),
+            self.hub,
+            site.rates.step_hz,
+            lambda: Wishes(dict(self._tip_heights)),
         )
         frames = Frames(self.hub, self.document)
         relay = Relay(session, self.hub, self._texts, frames.images)
@@ -177,6 +178,12 @@ class Station:
         gc.collect()
         gc.freeze()
 
+    def _image_loop(self, name: str, kinds: tuple[str, ...], rate: str, site: Site) -> ImageLoop:
+        sun = SunParameters(site.sun.m, site.sun.n, site.sun.eta)
+        worker = ImageWorker(Recipe(self.config, sun, kinds))
+        self._closing.callback(worker.close)
+        return ImageLoop(name, getattr(site.rates, rate), worker)
+
     def close(self) -> None:
         """Close everything, in the reverse order of opening."""
         self._closing.close()
@@ -184,7 +191,7 @@ class Station:
     def document(self, snapshot: Snapshot) -> dict[str, Any]:
         """A snapshot as plain JSON, with what only a running backend knows."""
         document = snapshot_document(snapshot, self.config)
-        rate = self.runner.image_timing[self._hz[0]].timing().rate
+        rate = self.runner.image_timing["images"].timing().rate
         if rate > 0.0:
             document["resolution"] = _resolutions(snapshot, self.config, 1.0 / rate)
         document["backend"] = self.backend()
@@ -200,8 +207,7 @@ class Station:
         """Live timings of both loops."""
         return {
             "step": vars(self.runner.step_timing.timing()),
-            "images": vars(self.runner.image_timing[self._hz[0]].timing()),
-            "zones": vars(self.runner.image_timing[self._hz[1]].timing()),
+            **{name: vars(watch.timing()) for name, watch in self.runner.image_timing.items()},
             "failure": self.runner.failure,
         }
 

@@ -13,9 +13,14 @@ from backend.pipeline.images import pair_key
 from backend.pipeline.place import base_transform
 from backend.pipeline.records import Snapshot
 from backend.pipeline.surroundings import growth
+from backend.spatial import rotation, transform
 from backend.spatial.types import Array
 
 TURNING = "turning"
+
+NEARLY_LEVEL = 0.01
+"""Less tilt than this counts as level ground, in return for growing the partner by what it moves:
+the swept zones of an upright machine take a fraction of the time [rad]."""
 
 
 @dataclass(frozen=True)
@@ -47,6 +52,13 @@ def zone_image(snapshot: Snapshot, config: Config, own: str, partner: str) -> Zo
         raise ValueError(f"{own} or {partner} is not placed yet")
     T, q = base_transform(state.pose), state.pose.joints
     eta = growth(own, snapshot.machines, config)
+    upright = rotation.rz(np.asarray(state.pose.yaw))
+    turn = float(np.arccos(np.clip((np.trace(upright.T @ T[:3, :3]) - 1.0) / 2.0, -1.0, 1.0)))
+    if turn < NEARLY_LEVEL:
+        # Set upright, no point of the machine moves farther than this.
+        reach = machine.bounding_radius + float(np.linalg.norm(machine.arm.T_root_swing[:3, 3]))
+        eta += turn * reach
+        T = transform.make(upright, T[:3, 3])
     zone = driving_zone(machine, q, T, body.boxes, eta)
     base = np.array(T[:2, 3])
     turning = turning_zone(machine, q, T, body.boxes, eta=eta)

@@ -1,9 +1,11 @@
-"""What images a running backend makes of its snapshots, and how often."""
+"""What images a running backend makes of its snapshots."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import partial
 from typing import Protocol
 
 from backend.pipeline.config import Config
@@ -27,42 +29,53 @@ class Image(Protocol):
 
 
 @dataclass(frozen=True)
-class ImageKind:
-    """hz: how often; targets: what to make one of for a snapshot; make: called with a target."""
+class Wishes:
+    """What operators chose. tip_heights: of the reach images, by machine [m]."""
 
-    name: str
-    hz: float
-    targets: Callable[[Snapshot], list[tuple[str, ...]]]
-    make: Callable[..., Image]
+    tip_heights: Mapping[str, float]
 
 
-def image_kinds(
-    config: Config,
-    sun: SunParameters,
-    image_hz: float,
-    zone_hz: float,
-    tip_height: Callable[[str], float | None],
-    cells: Cells | None = None,
-) -> tuple[ImageKind, ...]:
-    """tip_height: of a machine's reach image, as its operator picked it [m]; None: as it is."""
-    size = cells or Cells()
+@dataclass(frozen=True)
+class Made:
+    """An image, its kind, and how long it took [s]."""
 
-    def pairs(snapshot: Snapshot) -> list[tuple[str, ...]]:
-        return [*ordered_pairs(snapshot, config)]
+    kind: str
+    image: Image
+    seconds: float
 
-    def machines(snapshot: Snapshot) -> list[tuple[str, ...]]:
-        return [(own,) for own in own_machines(snapshot, config)]
 
-    return (
-        ImageKind(
-            SUN, image_hz, pairs, lambda s, own, other: pair_image(s, config, own, other, sun)
-        ),
-        ImageKind(
-            EXACT,
-            image_hz,
-            machines,
-            lambda s, own: own_image(s, config, own, size, tip_height(own)),
-        ),
-        ImageKind(ZONE, zone_hz, pairs, lambda s, own, other: zone_image(s, config, own, other)),
-        ImageKind(REGIONS, zone_hz, machines, lambda s, own: regions_image(s, config, own)),
-    )
+@dataclass(frozen=True)
+class Recipe:
+    """Kinds that are made together, one after the other. Plain data, for another process."""
+
+    config: Config
+    sun: SunParameters
+    kinds: tuple[str, ...]
+    cells: Cells = field(default_factory=Cells)
+
+
+def make_images(recipe: Recipe, snapshot: Snapshot, wishes: Wishes) -> list[Made]:
+    """All images of a recipe that mean something for this snapshot."""
+    made: list[Made] = []
+    for kind in recipe.kinds:
+        for make in _makers(kind, recipe, snapshot, wishes):
+            start = time.perf_counter()
+            image = make()
+            made.append(Made(kind, image, time.perf_counter() - start))
+    return made
+
+
+def _makers(
+    kind: str, recipe: Recipe, snapshot: Snapshot, wishes: Wishes
+) -> list[Callable[[], Image]]:
+    config, cells = recipe.config, recipe.cells
+    if kind in (SUN, ZONE):
+        pairs = ordered_pairs(snapshot, config)
+        if kind == ZONE:
+            return [partial(zone_image, snapshot, config, *pair) for pair in pairs]
+        return [partial(pair_image, snapshot, config, *pair, recipe.sun) for pair in pairs]
+    machines = own_machines(snapshot, config)
+    if kind == REGIONS:
+        return [partial(regions_image, snapshot, config, own) for own in machines]
+    heights = wishes.tip_heights
+    return [partial(own_image, snapshot, config, own, cells, heights.get(own)) for own in machines]

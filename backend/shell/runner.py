@@ -21,7 +21,8 @@ from backend.pipeline.config import Config
 from backend.pipeline.records import ImageStamp, Inputs, Snapshot
 from backend.pipeline.step import initial, step
 from backend.shell.hub import Hub
-from backend.shell.kinds import ImageKind
+from backend.shell.image_worker import WorkerGone
+from backend.shell.kinds import Made, Wishes
 
 log = logging.getLogger(__name__)
 
@@ -42,6 +43,21 @@ class Timing:
     p95: float
     p99: float
     rate: float
+
+
+class ImageMaker(Protocol):
+    """Makes images of a snapshot: a process of its own, or a function in a test."""
+
+    def make(self, snapshot: Snapshot, wishes: Wishes) -> list[Made]: ...
+
+
+@dataclass(frozen=True)
+class ImageLoop:
+    """Images that are made together. hz: how often, at most."""
+
+    name: str
+    hz: float
+    maker: ImageMaker
 
 
 class Stopwatch:
@@ -66,38 +82,43 @@ class Stopwatch:
 class Runner:
     """Runs the pipeline in real time until stopped; every view reads the hub.
 
-    kinds: the images to make; those of one rate share a loop, and the loops have nothing in common
-    but the interpreter.
+    loops: what images are made, and how often; wishes: what operators chose, asked each time.
     """
 
     def __init__(
         self,
         config: Config,
-        kinds: Iterable[ImageKind],
+        loops: Iterable[ImageLoop],
         source: Source,
         hub: Hub,
         step_hz: float,
+        wishes: Callable[[], Wishes] = lambda: Wishes({}),
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self.config = config
         self.hub = hub
         self.step_timing = Stopwatch()
-        self._kinds: dict[float, list[ImageKind]] = {}
-        for kind in kinds:
-            self._kinds.setdefault(kind.hz, []).append(kind)
-        self.image_timing = {hz: Stopwatch() for hz in sorted(self._kinds, reverse=True)}
+        image_loops = tuple(loops)
+        self._wishes = wishes
+        self.image_timing = {loop.name: Stopwatch() for loop in image_loops}
         self._source = source
         self._step_period = 1.0 / step_hz
         self._clock = clock
         self._done: deque[ImageStamp] = deque(maxlen=100)
         self._stopping = threading.Event()
-        loops: list[tuple[str, Callable[[], None]]] = [("fast loop", self._fast)]
-        loops += [(f"{hz:g} Hz image loop", partial(self._images, hz)) for hz in self._kinds]
+        bodies: list[tuple[str, Callable[[], None]]] = [("fast loop", self._fast)]
+        bodies += [(f"{loop.name} loop", partial(self._images, loop)) for loop in image_loops]
         self._threads = [
             threading.Thread(target=self._guard, args=(name, loop), name=name, daemon=True)
-            for name, loop in loops
+            for name, loop in bodies
         ]
-        self.failure: str = ""
+        self._fatal = ""
+        self.troubles: dict[str, str] = {}
+
+    @property
+    def failure(self) -> str:
+        """What does not run; empty while all does."""
+        return self._fatal or "; ".join(self.troubles.values())
 
     def start(self) -> None:
         for thread in self._threads:
@@ -114,8 +135,8 @@ class Runner:
             loop()
         except Exception as error:
             # A dead loop must be seen: without new snapshots every view goes stale, and says so.
-            self.failure = f"{name} stopped: {error!r}"
-            log.exception("%s", self.failure)
+            self._fatal = f"{name} stopped: {error!r}"
+            log.exception("%s", self._fatal)
 
     def _fast(self) -> None:
         state = initial(self.config)
@@ -135,23 +156,28 @@ class Runner:
             self.step_timing.add(start, self._clock())
             self.hub.publish(snapshot)
 
-    def _images(self, hz: float) -> None:
-        for _ in self._ticks(1.0 / hz):
+    def _images(self, loop: ImageLoop) -> None:
+        for _ in self._ticks(1.0 / loop.hz):
             snapshot = self.hub.latest()
             if snapshot is None:
                 continue
             start = self._clock()
-            for kind in self._kinds[hz]:
-                for target in kind.targets(snapshot):
-                    self._image(kind, snapshot, target)
-            self.image_timing[hz].add(start, self._clock())
-
-    def _image(self, kind: ImageKind, snapshot: Snapshot, target: tuple[str, ...]) -> None:
-        start = self._clock()
-        image = kind.make(snapshot, *target)
-        now = self._clock()
-        self.hub.publish_image(kind.name, image.key, image)
-        self._done.append(ImageStamp(image.key, kind.name, image.state_time, now, now - start))
+            try:
+                made = loop.maker.make(snapshot, self._wishes())
+            except (WorkerGone, RuntimeError) as error:
+                # The last images grow old, and every view says so; the next are tried anew.
+                self.troubles[loop.name] = f"{loop.name}: {error}"
+                log.warning("%s", self.troubles[loop.name])
+                self._stopping.wait(1.0)
+                continue
+            self.troubles.pop(loop.name, None)
+            now = self._clock()
+            for one in made:
+                self.hub.publish_image(one.kind, one.image.key, one.image)
+                stamp = ImageStamp(one.image.key, one.kind, one.image.state_time, now, one.seconds)
+                self._done.append(stamp)
+            if made:
+                self.image_timing[loop.name].add(start, now)
 
     def _ticks(self, period: float) -> Iterable[int]:
         """One tick a period; ticks that were missed are dropped, never made up for."""
