@@ -24,7 +24,7 @@ from backend.machine.model import Machine
 from backend.pipeline.config import Config
 from backend.pipeline.images import SunParameters
 from backend.pipeline.records import Snapshot
-from backend.pipeline.whatif import what_if
+from backend.pipeline.whatif import touches, what_if
 from backend.safety.partner import Limits
 from backend.shell.app.app import Sources, create_app
 from backend.shell.app.feed import Frames
@@ -234,6 +234,8 @@ class Station:
             raise InputError(f"joints.{unknown[0]} is unknown; allowed are {', '.join(roles)}.")
         q = snapshot.machines[own].pose.joints.copy()
         for role, value in joints.items():
+            if not isinstance(value, int | float) or not math.isfinite(value):
+                raise InputError(f"joints.{role} is {value!r}; allowed is an angle in radians.")
             q[roles.index(role)] = value
         return q
 
@@ -245,8 +247,7 @@ class Station:
             return
         with contextlib.suppress(ValueError, InputError):
             if kind == "ghost":
-                joints = message.get("joints")
-                self.view.set_ghost(name, joints if isinstance(joints, dict) else None, page)
+                self._show_ghost(name, message.get("joints"), page)
             elif kind == "zones":
                 self.view.set_zone_kind(str(message.get("kind")), page)
             elif not isinstance(name, str):
@@ -257,6 +258,18 @@ class Station:
                 self.view.set_own(name, page)
             elif kind == "tip_height" and name in self.config.own:
                 self._pick_height(name, message.get("height"))
+
+    def _show_ghost(self, machine: Any, joints: Any, page: str | None) -> None:
+        """A ghost in another posture; red where it would touch something."""
+        snapshot = self.hub.latest()
+        if machine is None or not isinstance(joints, dict) or snapshot is None:
+            self.view.set_ghost(None, page=page)
+            return
+        touched = None
+        if machine in self.config.own:
+            q = self._posture(machine, joints, snapshot)
+            touched = touches(snapshot, self.config, machine, q)
+        self.view.set_ghost(machine, joints, page, touched)
 
     def _pick_height(self, own: str, height: Any) -> None:
         """The height of a machine's reach image, for all pages; None: as the tip is."""

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from backend.collision.verdict import verdict
+from backend.cspace.exact_points import touching
 from backend.machine.kinematics import body_boxes, link_poses
 from backend.pipeline.config import Config
 from backend.pipeline.records import Snapshot
@@ -38,6 +39,15 @@ class WhatIf:
     distance: float
     closest: Touch | None
     hits: tuple[Touch, ...]
+
+
+def touches(snapshot: Snapshot, config: Config, own: str, q: Array) -> bool | None:
+    """A quick look at the same: whether anything touches; None when that is not known."""
+    if why_unknown(own, snapshot.machines, snapshot.pairs):
+        return None
+    around = surroundings_of(own, snapshot.machines, config)
+    against, itself = touching(config.machines[own], np.asarray(q, float)[None], around.boxes)
+    return bool(against[0] or itself[0])
 
 
 def what_if(snapshot: Snapshot, config: Config, own: str, q: Array) -> WhatIf:
