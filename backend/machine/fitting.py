@@ -14,14 +14,14 @@ from scipy.spatial import cKDTree
 
 from backend.machine.fitting_clip import extremes, outside_box, sample, subdivided, thin
 from backend.machine.fitting_field import box_surface, distance_field
-from backend.machine.fitting_search import Piece, search
+from backend.machine.fitting_search import search
 from backend.spatial.boxes import Boxes
 from backend.spatial.types import Array
 
 PAD = 7e-4  # [m] on every side: rounding, and the arc between two samples of a cylinder's sweep
 # The search aims so much [m] below max_excess, for the grid's error and the growth over what the
 # points left out; the next value where the first was reached and proved too little.
-_SLACK = (0.03, 0.045, 0.06)
+_SLACK = (0.014, 0.03)
 
 
 def fit_boxes(
@@ -50,25 +50,22 @@ def fit_boxes(
     points = _points(triangles)
     field = distance_field(triangles)
 
-    def boxes_of(pieces: list[Piece]) -> Boxes:
-        R = np.array([p.R for p in pieces])
-        low, high = np.array([p.low for p in pieces]), np.array([p.high for p in pieces])
-        low, high = _grown(triangles, R, low, high)
-        centers = (R @ ((low + high) / 2.0)[:, :, None])[:, :, 0]
-        return Boxes(centers, R, (high - low) / 2.0 + PAD)
-
-    best, least = None, np.inf
+    best, least = one, np.inf
     for slack in _SLACK:
-        tolerance = max(max_excess - slack, 0.5 * max_excess)
-        sets, reached = search(points, field, max_boxes, tolerance, report)
-        for boxes in map(boxes_of, sets):
+        wanted = max(max_excess - slack, 0.5 * max_excess)
+        found = search(triangles, points, field, max_boxes, wanted, report)
+        for R, low, high, tolerance in found:
+            low, high = _grown(triangles, R, low, high)
+            centers = (R @ ((low + high) / 2.0)[:, :, None])[:, :, 0]
+            boxes = Boxes(centers, R, (high - low) / 2.0 + PAD)
             value = _farthest(boxes, mesh, 0.03)
             if value < least:
                 best, least = boxes, value
-        if least <= max_excess or not reached:
+            if least <= max(max_excess, tolerance):
+                break
+        if least <= max_excess or tolerance > wanted:
             break
     report(1.0)
-    assert best is not None
     return best
 
 
