@@ -10,7 +10,6 @@ from scipy.ndimage import distance_transform_edt, label
 from backend.machine.fitting_clip import sample, thin
 from backend.spatial.types import Array
 
-_MARGIN = 0.15  # [m] the grid reaches so far beyond the mesh
 _NODES = 6e6  # at most; the step grows for large meshes
 
 
@@ -40,10 +39,10 @@ def box_surface(low: Array, high: Array, spacing: float) -> Array:
     return np.concatenate(faces)
 
 
-def distance_field(triangles: Array, step: float = 0.025) -> Field:
-    """The distance to triangles (n, 3, 3) [m], to some millimetres."""
+def distance_field(triangles: Array, margin: float = 0.15, step: float = 0.025) -> Field:
+    """The distance to triangles (n, 3, 3) [m], to some millimetres, up to `margin` beyond them."""
     corners = triangles.reshape(-1, 3)
-    origin, top = corners.min(axis=0) - _MARGIN, corners.max(axis=0) + _MARGIN
+    origin, top = corners.min(axis=0) - margin, corners.max(axis=0) + margin
     step = max(step, float((np.prod(top - origin) / _NODES) ** (1.0 / 3.0)))
     shape = np.ceil((top - origin) / step).astype(int) + 1
     points = thin(sample(triangles, step / 2), step / 4)

@@ -32,7 +32,7 @@ def value_at(values: Array, origin: Array, step: float, x: float, y: float, z: f
     near += fy * (values[i, j + 1, k] * gz + values[i, j + 1, k + 1] * fz)
     far = gy * (values[i + 1, j, k] * gz + values[i + 1, j, k + 1] * fz)
     far += fy * (values[i + 1, j + 1, k] * gz + values[i + 1, j + 1, k + 1] * fz)
-    return near * gx + far * fx
+    return float(near * gx + far * fx)
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]

@@ -108,7 +108,7 @@ class Pool:
     def _add(self, R: Array, low: Array, high: Array) -> None:
         at = (self.room.values, self.room.origin, self.room.step, self.tolerance)
         lowest, highest = kernels.bounds(self.points, R)
-        rates = np.exp(self.rng.uniform(*np.log(_RATES), size=6))
+        rates = np.exp(self.rng.uniform(np.log(_RATES[0]), np.log(_RATES[1]), 6))
         low, high = kernels.grown(
             *at,
             _SPACING,

@@ -24,8 +24,7 @@ _FIRST, _NEW, _KEPT = 4000, 600, 2000  # candidates at first, of each round, and
 _STEPS = 2000  # of one search for a cover
 # The tolerance rises after so many rounds without a better cover, or at once with more than
 # _HOPELESS points left open. The one that is wanted is given more of a chance.
-_PATIENCE, _PATIENCE_FIRST, _HOPELESS = 6, 12, 60
-_CHANCE = 5  # rounds at the wanted tolerance
+_PATIENCE, _PATIENCE_FIRST, _HOPELESS = 5, 25, 30
 _TURNS = (0.5, 4.0, 15.0)  # [deg] by which a box's axes are varied
 
 
@@ -37,7 +36,7 @@ def search(
     tolerance: float,
     progress: Callable[[float], None],
     raised: float = 0.015,
-    rounds: int = 200,
+    rounds: int = 70,
 ) -> Iterator[tuple[Array, Array, Array, float]]:
     """For one tolerance after another the boxes R (k, 3, 3), low, high (k, 3) found, and it [m].
 
@@ -71,7 +70,7 @@ def search(
             least, since = len(points), 0
             best = _pruned(pool, best, weights)
             continue
-        if since >= patience or (missing > _HOPELESS and r >= _CHANCE):
+        if since >= patience or missing > _HOPELESS:
             yield *tightened(targets, *_boxes(pool, best)), tolerance
             tolerance += max(raised, 0.05 * tolerance)
             least, since, patience = len(points), 0, _PATIENCE
