@@ -1,8 +1,9 @@
 """Oriented boxes from triangles: all of a mesh inside a few boxes, none of them far beyond it.
 
-The search works on points of the mesh. What its boxes leave out of the triangles between those
-points is then found by cutting every triangle at every box, and the boxes grow over it; so they
-contain each triangle completely, not only its corners.
+Two searches work on points of the mesh: a cover by boxes that each keep near it, and, where that
+does not come within max_excess, pieces whose boxes stick out as little as they can. What is then
+left out of the triangles between those points is found by cutting every triangle at every box, and
+the boxes grow over it; so they contain each triangle completely, not only its corners.
 """
 
 from __future__ import annotations
@@ -14,14 +15,16 @@ from scipy.spatial import cKDTree
 
 from backend.machine.fitting_clip import extremes, outside_box, sample, subdivided, thin
 from backend.machine.fitting_field import box_surface, distance_field
-from backend.machine.fitting_search import Piece, search
+from backend.machine.fitting_pieces import search_pieces
+from backend.machine.fitting_search import search
 from backend.spatial.boxes import Boxes
 from backend.spatial.types import Array
 
 PAD = 7e-4  # [m] on every side: rounding, and the arc between two samples of a cylinder's sweep
-# The search aims so much [m] below max_excess, for the grid's error and the growth over what the
+# The searches aim so much [m] below max_excess, for the grid's error and the growth over what the
 # points left out; the next value where the first was reached and proved too little.
-_SLACK = (0.03, 0.045, 0.06)
+_SLACK = (0.008, 0.02, 0.035)
+_SLACK_PIECES = 0.03
 
 
 def fit_boxes(
@@ -50,25 +53,33 @@ def fit_boxes(
     points = _points(triangles)
     field = distance_field(triangles)
 
-    def boxes_of(pieces: list[Piece]) -> Boxes:
-        R = np.array([p.R for p in pieces])
-        low, high = np.array([p.low for p in pieces]), np.array([p.high for p in pieces])
+    best, least = one, np.inf
+
+    def judge(R: Array, low: Array, high: Array) -> None:
+        nonlocal best, least
         low, high = _grown(triangles, R, low, high)
         centers = (R @ ((low + high) / 2.0)[:, :, None])[:, :, 0]
-        return Boxes(centers, R, (high - low) / 2.0 + PAD)
+        boxes = Boxes(centers, R, (high - low) / 2.0 + PAD)
+        value = _farthest(boxes, mesh, 0.03)
+        if value < least:
+            best, least = boxes, value
 
-    best, least = None, np.inf
     for slack in _SLACK:
-        tolerance = max(max_excess - slack, 0.5 * max_excess)
-        sets, reached = search(points, field, max_boxes, tolerance, report)
-        for boxes in map(boxes_of, sets):
-            value = _farthest(boxes, mesh, 0.03)
-            if value < least:
-                best, least = boxes, value
-        if least <= max_excess or not reached:
+        wanted = max(max_excess - slack, 0.5 * max_excess)
+        found = search(triangles, points, field, max_boxes, wanted, lambda s: report(s / 2.0))
+        for R, low, high, tolerance in found:
+            judge(R, low, high)
+            if least <= max(max_excess, tolerance):
+                break
+        if least <= max_excess or tolerance > wanted:
             break
+    if least > max_excess:
+        wanted = max(max_excess - _SLACK_PIECES, 0.5 * max_excess)
+        wide = distance_field(triangles, margin=0.6)
+        sets, _ = search_pieces(points, wide, max_boxes, wanted, lambda s: report((1.0 + s) / 2.0))
+        for pieces in sets:
+            judge(*(np.array([getattr(p, name) for p in pieces]) for name in ("R", "low", "high")))
     report(1.0)
-    assert best is not None
     return best
 
 

@@ -10,8 +10,13 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from backend.machine.fitting import excess, fit_boxes
+from backend.machine import fitting_kernels as kernels
+from backend.machine.fitting import excess, fit_boxes, surface_points
 from backend.machine.fitting_clip import clip, outside_box, sample, subdivided
+from backend.machine.fitting_cover import cover
+from backend.machine.fitting_field import distance_field, room
+from backend.machine.fitting_pool import Pool
+from backend.machine.fitting_search import covered, tightened
 from backend.machine.meshes import mesh_triangles
 from backend.spatial.boxes import Boxes
 from backend.spatial.rotation import about_axis
@@ -88,8 +93,66 @@ def test_subdivision_keeps_the_surface() -> None:
     assert area(small) == pytest.approx(area(L_SHAPE))
 
 
+def test_a_cover_is_found_where_there_is_one() -> None:
+    rng = np.random.default_rng(3)
+    hidden = np.repeat(np.eye(6, dtype=bool), 20, axis=1)  # six sets that together are everything
+    holds = np.concatenate([rng.random((300, 120)) < 0.3, hidden])[rng.permutation(306)]
+    nothing = np.zeros(0, dtype=np.int64)
+    rows, missing = cover(holds, np.ones(120), nothing, 6, 20_000, 0)
+    assert missing == np.count_nonzero(~holds[rows].any(axis=0)) == 0
+    rows, missing = cover(holds, np.ones(120), nothing, 2, 500, 0)
+    assert missing == np.count_nonzero(~holds[rows].any(axis=0)) > 0
+
+
+def test_the_field_is_the_distance_to_the_mesh() -> None:
+    field = distance_field(L_SHAPE)
+    # 0.1 m above the middle of the foot, and in its middle, 0.2 m from the faces
+    for p, d in (((1.0, 0.0, 0.3), 0.1), ((1.0, 0.0, 0.0), 0.2)):
+        value = kernels.value_at(field.values, field.origin, field.step, *p)
+        assert value == pytest.approx(d, abs=0.015)
+
+
+def test_a_box_may_fill_a_pocket_but_not_a_hollow_that_is_open() -> None:
+    sides = solid(*(((0.02, 1.0, 1.0), (x, 0.0, 0.0)) for x in (-0.5, 0.5)))
+    lids = np.concatenate([sides[:, :, order] for order in ((1, 0, 2), (1, 2, 0))])
+    R, half = np.eye(3), np.full(3, 0.45)
+    for triangles, allowed in ((np.concatenate([sides, lids]), True), (sides, False)):
+        space, pockets = room(distance_field(triangles), 0.1)
+        at = (space.values, space.origin, space.step, 0.1, 0.04)
+        assert kernels.clear(*at, R, -half, half, -1) is allowed
+        assert (len(pockets) > 0) is allowed
+
+
+def test_candidates_exceed_the_mesh_by_the_tolerance_at_most() -> None:
+    space, _ = room(distance_field(L_SHAPE), 0.1)
+    points = np.ascontiguousarray(sample(L_SHAPE, 0.1))
+    pool = Pool(L_SHAPE, points, space, 0.1, np.random.default_rng(0))
+    bars_at = np.array([[1.0, 0.0, 0.0], [0.2, 0.0, 0.8]])
+    bars = np.array([[[1.0, 0.2, 0.2]], [[0.2, 0.2, 0.8]]])
+    for k in range(60):
+        assert pool.offer(pool.axes(), points[[7 * k % len(points)]])
+    for R, low, high in zip(pool.R, pool.low, pool.high, strict=True):
+        box = Boxes((R @ (low + high) / 2)[None], R[None], (high - low)[None] / 2)
+        surface = surface_points(box, 0.03)
+        over = np.abs(surface - bars_at[:, None]) - bars  # (2, n, 3); in a bar where all < 0
+        outside = np.linalg.norm(np.maximum(over, 0.0), axis=2).min(axis=0)
+        assert outside.max() < 0.1 + 0.04
+
+
+def test_tightened_boxes_hold_the_same_points() -> None:
+    rng = np.random.default_rng(0)
+    points = rng.uniform(0.0, 1.0, (500, 3))
+    R = np.stack([np.eye(3)] * 3)
+    low = np.array([[-1.0, -1, -1], [0.4, -1, -1], [0.2, 0.2, 0.2]])
+    high = np.array([[0.6, 2.0, 2], [2.0, 2, 2], [0.3, 0.3, 0.3]])
+    small = tightened(points, R, low, high)
+    assert len(small[0]) == 2  # the third had nothing of its own
+    assert np.array_equal(covered(points, *small), covered(points, R, low, high))
+    assert np.prod(small[2] - small[1], axis=1).sum() < 1.1
+
+
 def test_an_l_shape_needs_two_boxes_and_is_contained() -> None:
-    boxes = fit_boxes(L_SHAPE, max_boxes=2, max_excess=0.1)
+    boxes = fit_boxes(L_SHAPE, max_boxes=2, max_excess=0.05)
     assert len(boxes) <= 2
     assert len(uncovered(boxes, L_SHAPE)) == 0
     assert excess(boxes, L_SHAPE) < 0.05

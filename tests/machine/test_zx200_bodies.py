@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 from collections import Counter
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 
+from backend.machine import fitting_kernels as kernels
 from backend.machine.fitting import excess
+from backend.machine.fitting_clip import sample
+from backend.machine.fitting_field import distance_field, room
 from backend.machine.load import SHIPPED, load_machine
 from backend.machine.model import Machine
 from backend.machine.sidecar import read_sidecar
@@ -16,8 +21,26 @@ from backend.machine.sweeps import swept_by_cylinders
 from backend.spatial.boxes import Boxes
 from backend.spatial.types import Array
 
-STATED = {"bucket": 0.15, "stick": 0.15, "boom": 0.30, "tracks": 0.30, "upper": 0.45}
+STATED = {"bucket": 0.15, "stick": 0.15, "boom": 0.20, "tracks": 0.24, "upper": 0.38}
 """Largest excess over the meshes [m] that the README states; 0.15 m is what is wanted of all."""
+
+
+# Points of the upper body [m], in the link's frame, no two of which share a box, see the test.
+APART = [
+    [1.54, 1.42, 1.63],
+    [-0.92, -0.46, 1.9],
+    [0.45, -1.12, 1.81],
+    [-0.75, -0.98, 1.73],
+    [-0.5, -0.09, 1.11],
+    [-2.6, 0.85, 1.74],
+    [-0.53, 1.21, 2.26],
+    [-1.27, 0.46, 1.48],
+    [-0.11, -0.97, 1.73],
+    [1.18, -1.25, 0.77],
+    [-1.17, -1.01, 1.8],
+    [-2.28, -0.68, 1.72],
+    [-0.01, -0.7, 1.13],
+]
 
 
 @pytest.fixture(scope="module")
@@ -95,3 +118,23 @@ def test_bodies_exceed_the_meshes_by_no_more_than_stated(
     measured = excess(bodies_of(zx200, link), triangles)
     print(f"\n{part}: expected <= {STATED[part]:.2f} m, measured {measured:.3f} m")
     assert measured <= STATED[part]
+
+
+def test_twelve_boxes_cannot_keep_the_upper_body_within_what_is_wanted(zx200: Machine) -> None:
+    """Thirteen points of the mesh need a box each, even with 0.16 m.
+
+    The way between any two of them leaves the room that boxes may fill, and a box is convex.
+    """
+    link = zx200.links[parts(zx200)["upper"]]
+    triangles = np.concatenate([v.vertices[v.faces] for v in link.visuals])
+    away, index = cKDTree(dense := sample(triangles, 0.02)).query(np.array(APART))
+    assert away.max() < 0.02
+    ends = dense[index]
+    allowed = 0.16  # the centimetre is for the grid's error
+    space, _ = room(distance_field(triangles), allowed)
+    share = np.linspace(0.0, 1.0, 300)[:, None]
+    for a, b in combinations(ends, 2):
+        way = a * (1.0 - share) + b * share
+        value = max(kernels.value_at(space.values, space.origin, space.step, *p) for p in way)
+        assert value > allowed
+    assert len(ends) > 12
