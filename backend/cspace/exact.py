@@ -10,7 +10,7 @@ import os
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -46,7 +46,7 @@ class JointGrid:
         if len(self.shape) != 4 or min(self.shape) < 1:
             raise ValueError(f"shape must be four numbers of at least 1, not {self.shape}")
 
-    @property
+    @cached_property
     def steps(self) -> Array:
         """(4,) width of a cell [rad]."""
         return np.asarray((self.upper - self.lower) / np.array(self.shape))

@@ -16,7 +16,7 @@ from backend.cspace.margins_kernel import advance
 from backend.machine.kinematics import link_poses
 from backend.machine.model import Machine
 from backend.spatial.boxes import Boxes
-from backend.spatial.types import Array, BoolArray, IntArray
+from backend.spatial.types import Array, IntArray
 
 TOLERANCE = 1e-8
 """Bodies that are closer than they can move in this many radians count as touching (tens of
@@ -75,27 +75,22 @@ def along(
     q, directions = np.asarray(q, dtype=float), np.asarray(directions, dtype=float)
     if not (np.isfinite(q).all() and np.isfinite(directions).all()):
         raise ValueError("joint values and directions must be finite numbers")
-    itself = np.array(machine.self_pairs, dtype=np.int64).reshape(-1, 2)
-    T = link_poses(machine, q)
-    rates, itself_rates, far = _rates(machine, T, directions, itself)
+    itself, apart = machine.self_pair_index, machine.self_pair_joints
+    far, T = machine.stretched_levers, link_poses(machine, q)
     wrong = np.zeros(len(itself))
     if slack is not None:
-        # Both bodies of a pair move by the joints that carry only one of them.
-        apart = machine.body_joints[itself[:, 0]] != machine.body_joints[itself[:, 1]]
         reach = np.where(apart, far[itself[:, 0]] + far[itself[:, 1]], 0.0)
         wrong = reach @ np.asarray(slack, dtype=float)
     fastest = np.abs(directions).max(axis=1, initial=0.0)
-    ends = np.array([_limit(machine, q, direction) for direction in directions])
     free, pair = advance(
-        machine.link_matrices,
-        machine.link_parents,
-        machine.link_joints,
+        (machine.link_matrices, machine.link_parents, machine.link_joints),
         machine.body_link_index,
+        machine.body_joints,
         _arrays(machine.bodies),
         _arrays(obstacles),
         itself,
-        rates,
-        itself_rates,
+        apart,
+        far,
         float(eta),
         wrong,
         T,
@@ -103,7 +98,7 @@ def along(
         directions,
         np.where(np.count_nonzero(directions, axis=1) == 1, np.abs(directions).argmax(axis=1), -1),
         _axes(machine, T),
-        ends,
+        _limits(machine, q, directions, fastest),
         TOLERANCE / np.maximum(fastest, 1e-300),
     )
     return [_named(free[k], pair[k], len(obstacles), itself) for k in range(len(directions))]
@@ -118,49 +113,14 @@ def _named(free: float, pair: int, obstacles: int, itself: IntArray) -> Margin:
     return Margin(float(free), against // obstacles, against % obstacles, False)
 
 
-def _limit(machine: Machine, q: Array, direction: Array) -> float:
-    """The s at which the first joint meets its limit; a whole turn when nothing limits."""
-    fastest = float(np.abs(direction).max())
-    end = 2.0 * math.pi / fastest if fastest > 0.0 else 0.0
-    for value, rate, low, high in zip(q, direction, machine.lower, machine.upper, strict=True):
-        if rate != 0.0:
-            end = min(end, ((high if rate > 0.0 else low) - value) / rate)
-    return max(end, 0.0)
-
-
-def _rates(
-    machine: Machine, T: Array, directions: Array, itself: IntArray
-) -> tuple[Array, Array, Array]:
-    """How fast bodies can move, per unit of each direction [m].
-
-    (k, bodies) in the root frame; (k, pairs) of the machine's own pairs against each other; and
-    (bodies, joints) levers of the stretched chain.
-    """
-    now, far = _levers(machine, T)
-    carried: BoolArray = machine.body_joints
-    alone = np.count_nonzero(directions, axis=1) == 1
-    size = np.abs(directions)
-    by_joint = np.where(alone[:, None, None], now, far) * size[:, None, :]  # (k, bodies, joints)
-    apart = carried[itself[:, 0]] != carried[itself[:, 1]]
-    both = by_joint[:, itself[:, 0]] + by_joint[:, itself[:, 1]]
-    return by_joint.sum(axis=2), np.where(apart, both, 0.0).sum(axis=2), far
-
-
-def _levers(machine: Machine, T: Array) -> tuple[Array, Array]:
-    """(bodies, joints) how far from each joint's axis a point of each body is, at most [m]: at link
-    poses T, which does not change while that joint alone moves; and with the chain stretched.
-    """
-    corners = machine.body_corners
-    Tb = T[machine.body_link_index]
-    placed = corners @ np.swapaxes(Tb[:, :3, :3], 1, 2) + Tb[:, None, :3, 3]
-    now = np.zeros((len(corners), len(machine.joints)))
-    for joint, link in enumerate(machine.joint_links):
-        axis = T[link, :3, :3] @ machine.links[link].axis
-        offset = placed - T[link, :3, 3]
-        along_axis = offset @ axis
-        squared = np.einsum("bci,bci->bc", offset, offset) - along_axis**2
-        now[:, joint] = np.sqrt(np.maximum(squared, 0.0).max(axis=1))
-    return np.where(machine.body_joints, now + 1e-9, 0.0), machine.stretched_levers
+def _limits(machine: Machine, q: Array, directions: Array, fastest: Array) -> Array:
+    """(k,) the s at which the first joint meets its limit; a whole turn when nothing limits."""
+    moving = directions != 0.0
+    end = np.where(directions > 0.0, machine.upper, machine.lower) - q
+    with np.errstate(divide="ignore", invalid="ignore"):
+        first = np.where(moving, end / directions, np.inf).min(axis=1, initial=np.inf)
+        turn = np.where(fastest > 0.0, 2.0 * math.pi / fastest, 0.0)
+    return np.asarray(np.maximum(np.minimum(first, turn), 0.0))
 
 
 def _axes(machine: Machine, T: Array) -> Array:

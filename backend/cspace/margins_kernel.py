@@ -9,7 +9,7 @@ from numba import njit
 
 from backend.collision.box_kernels import pair_distance
 from backend.cspace.exact_boxes import gap
-from backend.spatial.types import Array, IntArray
+from backend.spatial.types import Array, BoolArray, IntArray
 
 CLOSE = 0.05
 """Where something counts as contact before it touches, and a gap is within this of it, the distance
@@ -87,15 +87,14 @@ def rings(centers: Array, rotations: Array, halves: Array, origin: Array, axis: 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def advance(
-    M: Array,
-    parents: IntArray,
-    joints: IntArray,
+    chain: tuple[Array, IntArray, IntArray],
     links: IntArray,
+    carried: BoolArray,
     own: tuple[Array, Array, Array],
     others: tuple[Array, Array, Array],
     itself: IntArray,
-    rates: Array,
-    itself_rates: Array,
+    against_itself: BoolArray,
+    far: Array,
     eta: float,
     wrong: Array,
     T: Array,
@@ -109,10 +108,12 @@ def advance(
     """(how far (k,), the pair that ends it (k,) or -1) along q + s directions[k], s <= ends[k].
 
     Pairs are numbered: first `itself` (p, 2) of own bodies, then own body i against obstacle j as
-    p + i m + j. rates: (k, n), itself_rates: (k, p) how fast they move at most, per unit of s;
-    eta: gap to an obstacle that counts as contact, wrong: (p,) the same among own bodies [m]; T:
-    (L, 4, 4) link poses at q; alone: (k,) the only joint of a direction, -1 where there are more;
-    axes: (joints, 2, 3) origins and unit vectors at q; steps: (k,) the least advance.
+    p + i m + j. chain: Machine.link_matrices, .link_parents, .link_joints; carried: (n, joints)
+    which joints move which body; against_itself: (p, joints) which joints move the bodies of a
+    pair against each other; far: (n, joints) levers of the stretched chain [m]; eta: gap to an
+    obstacle that counts as contact, wrong: (p,) the same among own bodies [m]; T: (L, 4, 4) link
+    poses at q; alone: (k,) the only joint of a direction, -1 where there are more; axes:
+    (joints, 2, 3) origins and unit vectors at q; steps: (k,) the least advance.
     """
     n, m, p = len(links), len(others[0]), len(itself)
     points = np.empty((2, 3))
@@ -123,10 +124,28 @@ def advance(
     for j in range(m):
         other_radius[j] = math.sqrt((others[2][j] ** 2).sum())
     apart = np.empty(p + n * m)  # at s = 0, less what counts as contact
+    joints = axes.shape[0]
+    turned, around = np.empty((joints, n, 4)), np.empty((joints, m, 4))
+    for j in range(joints):
+        turned[j] = rings(centers, rotations, own[2], axes[j, 0], axes[j, 1])
+        around[j] = rings(others[0], others[1], others[2], axes[j, 0], axes[j, 1])
+    # While one joint moves alone, a point keeps its distance from the axis; else the chain may
+    # stretch.
+    levers = np.zeros((len(ends), n, joints))
+    rates, itself_rates = np.zeros((len(ends), n)), np.zeros((len(ends), p))
     horizon = np.zeros(n)
     for k in range(len(ends)):
         for i in range(n):
+            for j in range(joints):
+                if carried[i, j]:
+                    levers[k, i, j] = turned[j, i, 1] + 1e-9 if alone[k] == j else far[i, j]
+                    rates[k, i] += levers[k, i, j] * abs(directions[k, j])
             horizon[i] = max(horizon[i], rates[k, i] * ends[k])
+        for c in range(p):
+            for j in range(joints):
+                if against_itself[c, j]:
+                    both = levers[k, itself[c, 0], j] + levers[k, itself[c, 1], j]
+                    itself_rates[k, c] += both * abs(directions[k, j])
     for k in range(len(apart)):
         i, j = (itself[k, 0], itself[k, 1]) if k < p else ((k - p) // m, (k - p) % m)
         if k >= p and horizon[i] == 0.0:
@@ -147,7 +166,6 @@ def advance(
             g = max(g, gap(centers[i], rotations[i], own[2][i], cb, Rb, hb, math.inf))
         apart[k] = g - less
     free, pair = ends.copy(), np.full(len(ends), -1, np.int64)
-    turned = around = np.empty((0, 4))
     chosen, safe = np.empty(len(apart), np.int64), np.empty(len(apart))
     ca, cb2 = np.empty(3), np.empty(3)
     Ra, Rb2 = np.empty((3, 3)), np.empty((3, 3))
@@ -155,20 +173,16 @@ def advance(
         if ends[k] <= 0.0:
             continue
         count = 0
-        single = alone[k] >= 0
-        if single:
-            origin, axis = axes[alone[k], 0], axes[alone[k], 1]
-            turned = rings(centers, rotations, own[2], origin, axis)
-            around = rings(others[0], others[1], others[2], origin, axis)
+        single = alone[k]
         for c in range(len(apart)):
             rate = itself_rates[k, c] if c < p else rates[k, (c - p) // m]
             if rate > 0.0 and apart[c] < rate * ends[k]:
-                if single:
+                if single >= 0:
                     # What turns about an axis stays in its ring: most pairs can never meet.
                     i = itself[c, 0] if c < p else (c - p) // m
-                    other = turned[itself[c, 1]] if c < p else around[(c - p) % m]
+                    other = turned[single, itself[c, 1]] if c < p else around[single, (c - p) % m]
                     less = wrong[c] if c < p else eta
-                    ring = turned[i]
+                    ring = turned[single, i]
                     if (
                         max(ring[0], other[0]) > min(ring[1], other[1]) + less
                         or max(ring[2], other[2]) > min(ring[3], other[3]) + less
@@ -189,10 +203,10 @@ def advance(
                 if s > 0.0:
                     ca[:], Ra[:] = own[0][i], own[1][i]
                     posture = q + s * directions[k]
-                    place(M, parents, joints, posture, links[i], ca, Ra)
+                    place(chain[0], chain[1], chain[2], posture, links[i], ca, Ra)
                     if c < p:
                         cb2[:], Rb2[:] = own[0][j], own[1][j]
-                        place(M, parents, joints, posture, links[j], cb2, Rb2)
+                        place(chain[0], chain[1], chain[2], posture, links[j], cb2, Rb2)
                         hb = own[2][j]
                         rb = radius[j]
                     else:

@@ -262,6 +262,17 @@ class Machine:
         return moved
 
     @cached_property
+    def self_pair_index(self) -> IntArray:
+        """(p, 2) self_pairs as an index array."""
+        return np.array(self.self_pairs, dtype=np.int64).reshape(-1, 2)
+
+    @cached_property
+    def self_pair_joints(self) -> BoolArray:
+        """(p, n) the joints that move the bodies of a pair against each other: carry only one."""
+        pairs = self.self_pair_index
+        return np.asarray(self.body_joints[pairs[:, 0]] != self.body_joints[pairs[:, 1]])
+
+    @cached_property
     def body_parts(self) -> AnyArray:
         """(n,) the part of each body."""
         return np.array([self.links[link].part for link in self.body_links])

@@ -18,6 +18,9 @@ from backend.spatial.types import Array
 
 TURNING = "turning"
 
+TOLERANCE = 0.01
+"""How far the live zones may exceed the true ones [m]."""
+
 NEARLY_LEVEL = 0.01
 """Less tilt than this counts as level ground, in return for growing the partner by what it moves:
 the swept zones of an upright machine take a fraction of the time [rad]."""
@@ -59,9 +62,9 @@ def zone_image(snapshot: Snapshot, config: Config, own: str, partner: str) -> Zo
         reach = machine.bounding_radius + float(np.linalg.norm(machine.arm.T_root_swing[:3, 3]))
         eta += turn * reach
         T = transform.make(upright, T[:3, 3])
-    zone = driving_zone(machine, q, T, body.boxes, eta)
+    zone = driving_zone(machine, q, T, body.boxes, eta, TOLERANCE)
     base = np.array(T[:2, 3])
-    turning = turning_zone(machine, q, T, body.boxes, eta=eta)
+    turning = turning_zone(machine, q, T, body.boxes, eta=eta, tolerance=TOLERANCE)
     zones = {
         "as_is": zone.as_is,
         "any_swing": zone.any_swing,

@@ -71,7 +71,7 @@ class Rates(Table):
 
     step_hz: Annotated[float, Field(ge=1.0, le=200.0)] = 50.0
     image_hz: Annotated[float, Field(ge=0.1, le=50.0)] = 10.0
-    zone_hz: Annotated[float, Field(ge=0.1, le=50.0)] = 2.0
+    zone_hz: Annotated[float, Field(ge=0.1, le=50.0)] = 1.0
 
 
 class Start(Table):
