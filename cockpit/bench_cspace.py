@@ -57,8 +57,9 @@ def _image_rows(
         lambda: blocked(model, grid, scene.partner),
         lambda: memory.fill(0),
     )
+    _, new = _in_turns(count, lambda: None, lambda: np.empty_like(bits).fill(0))
     name = f"exact image, {scene.name}, {_size(shape)}"
-    multiples = ours / np.median(peer)
+    multiples, of_new = ours / np.median(peer), ours / np.median(new)
     return [
         BenchRow(
             name=name,
@@ -74,6 +75,12 @@ def _image_rows(
             unit="x",
             spread=_spread(multiples),
             target=target,
+        ),
+        BenchRow(
+            name=f"{name}, of memset of a new image, as ours is",
+            value=float(np.median(of_new)),
+            unit="x",
+            spread=_spread(of_new),
         ),
         _share_row(f"colliding cells, {scene.name}, {_size(shape)}", _share(bits, grid)),
     ]
