@@ -76,7 +76,7 @@ def live_rows(seconds: float, site: str = SITE, name: str = "live") -> list[Benc
         for subscriber in subscribers:
             subscriber.undeclare()
         session.close()
-        memory = _resident(process.pid)
+        memory = resident(process.pid)
     latencies = _latencies(arrivals, frames)
     last = frames[-1][1]["backend"]
     rows = percentile_rows(f"{name} pose arrival on Zenoh to websocket", latencies, 60.0)
@@ -106,7 +106,7 @@ def live_rows(seconds: float, site: str = SITE, name: str = "live") -> list[Benc
         )
     rows.append(
         BenchRow(
-            name=f"{name} backend memory",
+            name=f"{name} backend memory, all processes",
             value=memory,
             unit="MiB",
             spread=(memory, memory),
@@ -204,12 +204,18 @@ def _end(process: subprocess.Popen) -> None:
         process.kill()
 
 
-def _resident(pid: int) -> float:
-    """Resident memory of a process [MiB]; NaN where the system does not tell."""
+def resident(pid: int) -> float:
+    """Resident memory of a process and of those that it started [MiB]; NaN where it is not told.
+
+    What they share counts once for each: the sum is never too small.
+    """
     status = Path(f"/proc/{pid}/status")
     if not status.is_file():
         return float(np.nan)
+    total = 0.0
     for line in status.read_text().splitlines():
         if line.startswith("VmRSS"):
-            return float(line.split()[1]) / 1024.0
-    return float(np.nan)
+            total = float(line.split()[1]) / 1024.0
+    for children in Path(f"/proc/{pid}/task").glob("*/children"):
+        total += sum(resident(int(child)) for child in children.read_text().split())
+    return total

@@ -23,6 +23,8 @@ class Watched:
     def __init__(self, browser: Browser, url: str, size: tuple[int, int]) -> None:
         width, height = size
         self.page: Page = browser.new_page(viewport={"width": width, "height": height})
+        # Drawn by the processor, beside all processes of a site: a picture can take its time.
+        self.page.set_default_timeout(120_000)
         self.errors: list[str] = []
         self.page.on("pageerror", lambda error: self.errors.append(str(error)))
         self.page.on("console", lambda m: self.errors.append(m.text) if m.type == "error" else None)

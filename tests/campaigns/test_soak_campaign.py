@@ -4,23 +4,16 @@ from __future__ import annotations
 
 import os
 import time
-from pathlib import Path
 
 import numpy as np
 import pytest
 from live import all_valid, backend
 from watched import Watch
 
+from cockpit.bench_live import resident
+
 MINUTES = float(os.environ.get("SOAK_MINUTES", "10"))
 ALLOWED = 1.0  # MiB per minute after the first minute
-
-
-def resident(pid: int) -> float:
-    """Resident memory [MiB]."""
-    for line in Path(f"/proc/{pid}/status").read_text().splitlines():
-        if line.startswith("VmRSS"):
-            return float(line.split()[1]) / 1024.0
-    raise AssertionError(f"process {pid} does not tell its memory")
 
 
 @pytest.mark.timeout(1800)
