@@ -3,6 +3,7 @@
 import { wrap } from "./axis.js";
 
 const HISTORY = 60; // seconds of trends
+const ZONE_OLD = 2.5; // exact zones are made once a second [s]
 const SWITCH = 0.3; // a new partner must be this much nearer [m], so that the panels do not flip
 
 export const state = {
@@ -150,7 +151,7 @@ export function imageAge(entry) {
 /** Too old, or computed from a machine whose own data are not valid. */
 export function imageStale(entry) {
   if (!entry) return true;
-  return imageAge(entry) > 1 || parties(entry).some((name) => machine(name).validity !== "VALID");
+  return imageAge(entry) > (entry.header.type === "zone" ? ZONE_OLD : 1) || parties(entry).some((name) => machine(name).validity !== "VALID");
 }
 
 export function link() {

@@ -38,7 +38,7 @@ export function resend() {
 
 export function update() {
   const height = picked(state.own);
-  write($("tip-now"), height === null ? "tip now" : `${number(height, 2)} m`);
+  write($("tip-now"), height === null ? "now" : `${number(height, 2)} m`);
   $("tip-now").setAttribute("aria-pressed", String(height !== null));
 }
 

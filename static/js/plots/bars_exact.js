@@ -73,7 +73,7 @@ export function paint(g, width, height, dpr) {
   const joints = described(state.own).joints.filter(({ role }) => header.bars.some((bar) => bar.joint === role));
   const m = machine(state.own);
   const t3 = size("t3"), t = size("tick");
-  const left = Math.round(3.9 * t3 + 3.2 * t), right = width - Math.round(3.9 * t3 + 3 * t);
+  const left = Math.round(3.9 * t3 + 3.2 * t), right = width - Math.round(4.5 * t3 + 3 * t);
   const foot = Math.round(1.25 * t);
   const pitch = (height - foot) / joints.length;
   const thick = Math.round(Math.min(0.9 * t3, pitch - t - 6)); // a line of text stands below each
