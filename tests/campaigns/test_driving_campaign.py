@@ -88,10 +88,10 @@ def test_zones(models: tuple[str, str], slope: str, shared_data: Path) -> None:
 
 
 def needlessly_blocked(own, q, T, bodies, zone, rng) -> float:  # type: ignore[no-untyped-def]
-    """Farthest from the edge of 2,000 inside places at which no swing, 0.06 deg apart, collides."""
-    places = near_edge(zone, rng, 2000)
+    """Farthest from the edge of 600 places at which no swing, 0.1 deg apart, collides."""
+    places = near_edge(zone, rng, 600)
     left = places[shapely.contains_xy(zone, places)]
-    for step in (720, 6000):
+    for step in (360, 3600):
         for angle in np.linspace(-np.pi, np.pi, step, endpoint=False):
             if len(left) == 0:
                 return 0.0
