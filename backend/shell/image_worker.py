@@ -12,7 +12,7 @@ from typing import Any
 from backend.pipeline.records import Snapshot
 from backend.shell.kinds import Made, Recipe, Wishes, make_images
 
-NICENESS = 10
+NICENESS = 2
 """The fast loop goes before the images when processors are short."""
 
 

@@ -13,7 +13,7 @@ from cockpit.views import palette
 from cockpit.views.inputs import ExactZoneImage
 from cockpit.views.shapes import NO_LINE, Float32, dashed, filled_geometry, polyline, rings
 
-OLD = 2.5  # [s] after which a zone is no longer coloured: it is made about once a second
+OLD = 2.0  # [s] after which a zone is no longer coloured: it is made about once a second
 DRAWN = 0.005  # how far the drawing may be from the zone [m]
 AS_IS = "as_is"
 # Per variant: lengths of dashes and gaps [m] (None: solid), width [px].

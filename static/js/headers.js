@@ -22,7 +22,7 @@ export function startHeaders(switchImages) {
 function widest(place, texts) {
   const panel = place.closest(".panel");
   const others = [...panel.querySelectorAll("header > *")].filter((node) => node !== place).reduce((sum, node) => sum + node.getBoundingClientRect().width + 8, 0);
-  const room = panel.clientWidth - others - 24;
+  const room = panel.clientWidth - others - 80; // the age can grow by a glyph and digits meanwhile
   const g = (widest.g ??= document.createElement("canvas").getContext("2d"));
   const style = getComputedStyle(place);
   g.font = `${style.fontWeight} ${style.fontSize} ${style.fontFamily}`;
