@@ -44,7 +44,11 @@ ROOMS: dict[str, set[str]] = {
 LIBRARIES = {
     "fcl": "backend.collision",
     "zenoh": "backend.shell.link",
-    "rosbags": "backend.shell.link",
+    "rosbags": "backend.shell",
+    "mcap": "backend.shell.session",
+    "can": "backend.shell.session",
+    "cantools": "backend.shell.session",
+    "pyarrow": "backend.shell.session",
     "fastapi": "backend.shell.app",
     "fastapi_offline": "backend.shell.app",
     "starlette": "backend.shell.app",
@@ -112,7 +116,7 @@ def test_every_import_is_a_declared_dependency(repository: Path) -> None:
     import tomllib
 
     project = tomllib.loads((repository / "pyproject.toml").read_text())["project"]
-    aliases = {"eclipse-zenoh": "zenoh", "python-fcl": "fcl", "pyyaml": "yaml"}
+    aliases = {"eclipse-zenoh": "zenoh", "python-can": "can", "python-fcl": "fcl", "pyyaml": "yaml"}
     declared = {aliases.get(name, name).replace("-", "_") for name in project["dependencies"]}
     for path in sources():
         for name in imports_of(path):

@@ -1,0 +1,1 @@
+"""Recorded sessions: writing, reading, playing, and turning other people's recordings into ours."""
