@@ -9,7 +9,7 @@ monotonic clock, plus an offset that is fixed when a recording begins (`Header.o
 time t [s] of the monotonic clock becomes `stamp(t)` and comes back bit by bit by `seconds(...)`,
 so that a replay sees exactly what the live pipeline saw.
 
-Order. In a file, the messages that a cycle of the pipeline consumed stand before the `/cockpit/cycle`
+Order. The messages that a cycle of the pipeline consumed stand before the `/cockpit/cycle`
 message of that cycle. A replay hands them to the pipeline in just these portions; a recording
 without cycles (of a ROS 2 machine) is replayed in portions of one period.
 """
