@@ -1,8 +1,8 @@
 """Writing one MCAP file so that whatever was written stays readable.
 
-mcap's own writer keeps schemas and channels inside chunks, where one damaged chunk takes them along,
-and does not say how far a file is whole after a failed write. Here they stand between the chunks,
-every finished chunk goes to the operating system at once, and a failed write is cut off again.
+mcap's own writer keeps schemas and channels inside chunks, where one damaged chunk takes them
+along, and does not say how far a file is whole after a failed write. Here they stand between the
+chunks, every finished chunk goes to the operating system at once, and a failed write is cut off.
 """
 
 from __future__ import annotations
@@ -85,10 +85,11 @@ class McapFile:
 
     def schema(self, name: str, encoding: str, data: bytes) -> int:
         """The new schema's id."""
-        schema = Schema(id=len(self._schemas) + 1, name=name, encoding=encoding, data=data)
+        number = len(self._schemas) + 1
+        schema = Schema(id=number, name=name, encoding=encoding, data=data)
         self._put(_record(schema))
         self._schemas.append(schema)
-        return schema.id
+        return number
 
     def channel(self, topic: str, encoding: str, schema: int) -> int:
         """The new channel's id. schema: 0 for none."""
