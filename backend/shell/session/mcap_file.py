@@ -53,7 +53,8 @@ class _Open:
 class McapFile:
     """Creates a file, which must not exist. Every method raises OSError when the disk refuses.
 
-    After an OSError the file ends with the last whole record: call `abandon`.
+    After an OSError the file ends with the last whole record. Then `drop_chunk` and `close` finish
+    it as soon as the disk allows it, or `abandon` leaves it without a summary.
     """
 
     def __init__(self, path: Path, profile: str, library: str) -> None:
@@ -151,6 +152,10 @@ class McapFile:
         self.end = max(self.end, chunk.end)
         for channel, entries in chunk.entries.items():
             self.counts[channel] = self.counts.get(channel, 0) + len(entries)
+        self._open = _Open()
+
+    def drop_chunk(self) -> None:
+        """Forgets the messages in the chunk being filled."""
         self._open = _Open()
 
     def close(self) -> None:
