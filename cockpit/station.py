@@ -9,13 +9,12 @@ import sys
 import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Any
 
-import numpy as np
 from rich.console import Console
 from rich.progress import Progress
 
-from backend.cspace.resolution import resolution
 from backend.documents.site import site_document
 from backend.documents.snapshot import snapshot_document
 from backend.errors import InputError
@@ -42,6 +41,8 @@ from backend.shell.runner import ImageLoop, Runner
 from backend.site.bodies import site_bodies
 from backend.site.site import Site
 from backend.spatial.types import Array
+from cockpit.recording import make_recorder, recording_sources
+from cockpit.resolutions import resolutions
 from cockpit.views.inputs import scene_site
 from cockpit.views.server import HEAD, View, start
 
@@ -54,7 +55,8 @@ LOOPBACK = ("127.0.0.1", "localhost", "::1")
 
 @dataclass(frozen=True)
 class Options:
-    """host, port: of the page; listen, connect: Zenoh endpoints; own: machines answered for."""
+    """host, port: of the page; listen, connect: Zenoh endpoints; own: machines answered for;
+    recording: whether; record: in which folder, None for the site's own."""
 
     host: str
     port: int
@@ -62,6 +64,8 @@ class Options:
     connect: tuple[str, ...]
     own: tuple[str, ...]
     mode: str
+    record: Path | None = None
+    recording: bool = True
 
 
 def load_models(site: Site) -> dict[str, Machine]:
@@ -138,15 +142,18 @@ class Station:
         session = open_session(options.listen, options.connect, mode="router")
         self._closing.callback(session.close)
         prefixes = {machine.prefix: machine.name for machine in site.machines}
-        self.receiver = Receiver(session, prefixes)
+        self.recorder = make_recorder(site, self.config, options)
+        self.receiver = Receiver(session, prefixes, everything=self.recorder.wants_everything)
         self._closing.callback(self.receiver.close)
         self.runner = Runner(
             self.config,
             [self._image_loop(*loop, site) for loop in _LOOPS],
-            LinkSource(self.receiver),
+            LinkSource(self.receiver, self.recorder.hear),
             self.hub,
             site.rates.step_hz,
             lambda: Wishes(dict(self._tip_heights)),
+            notices=self.recorder.notices,
+            after_cycle=self.recorder.after_cycle,
         )
         frames = Frames(self.hub, self.document)
         relay = Relay(session, self.hub, self._texts, frames.images)
@@ -158,6 +165,7 @@ class Station:
             backend=self.backend,
             on_message=self._on_message,
             what_if=self._what_if,
+            recording=recording_sources(self.recorder, site, options),
         )
         hooks = Hooks(opened=self.view.attach, closed=self.view.detach)
         loopback = options.host in LOOPBACK
@@ -167,6 +175,8 @@ class Station:
             hosts=LOOPBACK if loopback else ("*",),
         )
         self.web = WebServer(app, listener)
+        self.recorder.start()
+        self._closing.callback(self.recorder.close)
         self.runner.start()
         self._closing.callback(self.runner.stop)
         relay.start()
@@ -193,15 +203,20 @@ class Station:
         document = snapshot_document(snapshot, self.config)
         rate = self.runner.image_timing["images"].timing().rate
         if rate > 0.0:
-            document["resolution"] = _resolutions(snapshot, self.config, 1.0 / rate)
+            document["resolution"] = resolutions(snapshot, self.config, 1.0 / rate)
         document["backend"] = self.backend()
+        document["recording"] = vars(self.recorder.state())
         if self._demo_began is not None:
             document["demo"] = {"elapsed": time.time() - self._demo_began()}
         return document
 
     def _texts(self, snapshot: Snapshot) -> tuple[str, str]:
+        """JSON of a snapshot and of its alarms, for others and for the recording."""
         document = self.document(snapshot)
-        return dumps(document), dumps(document["alarms"])
+        text, alarms = dumps(document), dumps(document["alarms"])
+        self.recorder.snapshot(text, snapshot.time)
+        self.recorder.alarms(alarms, snapshot.time)
+        return text, alarms
 
     def backend(self) -> dict[str, Any]:
         """Live timings of both loops."""
@@ -220,6 +235,7 @@ class Station:
         if snapshot is None:
             raise InputError("no cycle has finished yet; try again.")
         q = self._posture(own, joints, snapshot)
+        self.recorder.action("whatif", None, {"machine": own, "joints": joints})
         found = what_if(snapshot, self.config, own, q)
         roles = [joint.role for joint in self.config.machines[own].joints]
         posture = dict(zip(roles, q.tolist(), strict=True))
@@ -246,6 +262,11 @@ class Station:
         if not (page is None or isinstance(page, str)):
             return
         with contextlib.suppress(ValueError, InputError):
+            if kind == "marker":
+                self.recorder.mark("note", str(message.get("text", "")))
+                return
+            if isinstance(kind, str):
+                self.recorder.action(kind, page, message)
             if kind == "ghost":
                 self._show_ghost(name, message.get("joints"), page)
             elif kind == "zones":
@@ -277,21 +298,3 @@ class Station:
             self._tip_heights.pop(own, None)
         elif isinstance(height, int | float) and abs(height) < MAX_HEIGHT:
             self._tip_heights[own] = float(height)
-
-
-def _resolutions(
-    snapshot: Snapshot, config: Config, cycle_time: float
-) -> dict[str, dict[str, Any]]:
-    """Sun 2020, Section 5.1, per machine, at the rate that images really have."""
-    found = {}
-    for name, state in snapshot.machines.items():
-        speed = float(np.linalg.norm(state.pose.base_velocity))
-        if not math.isfinite(speed):
-            continue
-        now = resolution(cycle_time, speed, state.pose.joint_velocities)
-        roles = [joint.role for joint in config.machines[name].joints]
-        found[name] = {
-            "points_per_m": now.points_per_metre,
-            "points_per_rad": dict(zip(roles, now.points_per_radian.tolist(), strict=True)),
-        }
-    return found

@@ -182,7 +182,13 @@ class SnapshotModel(BaseModel):
     resolution: dict[str, ResolutionModel] = Field(
         default_factory=dict, description="Sun 2020, Section 5.1, live"
     )
+    recording: RecordingStateModel | None = Field(None, description="of this backend")
     demo: DemoModel | None = Field(None, description="only in the demo")
+
+
+class RecordingStateModel(BaseModel):
+    state: str = Field(description="on, off or trouble")
+    text: str = Field(description="since when it is on, why it is off, or what is wrong")
 
 
 class ResolutionModel(BaseModel):

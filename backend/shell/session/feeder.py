@@ -11,6 +11,7 @@ import contextlib
 import itertools
 import logging
 import multiprocessing
+import signal
 import threading
 import time
 from collections import deque
@@ -18,7 +19,7 @@ from collections.abc import Callable
 from multiprocessing.connection import Connection
 from typing import Any
 
-from backend.shell.session.keeper import Answer, Order, Plan, Record, run
+from backend.shell.session.keeper import SIGNALS, Answer, Order, Plan, Record, run
 
 log = logging.getLogger(__name__)
 
@@ -155,7 +156,10 @@ class Feeder:
         ours, theirs = context.Pipe()
         process = context.Process(target=self._target, args=(theirs, self._plan), daemon=True)
         self._ready, self._waiting, self._sent = False, self._clock(), 0
+        # A Ctrl-C for all must not meet it before it has its own answer: it inherits the mask.
+        mask = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
         process.start()
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
         theirs.close()
         self._process, self._connection = process, ours
         self._hear_answer(ours)

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from backend.errors import InputError
 from backend.shell.session.format import Header, Message
-from backend.shell.session.recover import Damaged, recover
+from backend.shell.session.recover import Damaged, NothingSaved, recover
 from backend.shell.session.ring import (
     LOCK,
     Limits,
@@ -28,10 +28,13 @@ from backend.shell.session.ring import (
 from backend.shell.session.rosbag2 import METADATA_FILE, contents, write_metadata
 from backend.shell.session.writer import SessionWriter
 
+SIGNALS = (signal.SIGINT, signal.SIGTERM)
+"""Blocked while the process starts."""
 NICENESS = 5
 """Everything that an operator sees goes first."""
 CHUNK_SECONDS = 0.5  # at most this much is in a chunk
 SPACE_PERIOD = 0.5  # between two looks at the disk's free space [s]
+NOTHING = 2**20  # a cut part without a whole chunk that is smaller is of no use [bytes]
 TRIES = 50  # to finish a part after a failed write
 GRACE = 3.0  # from SIGTERM until the process ends, unless its parent does before [s]
 
@@ -208,11 +211,12 @@ class Keeper:
         """
         self._lock()
         own = self._plan.folder
-        for part in reversed(parts_of(own)):
-            self._next = max(self._next, part.number + 1)
-            repair(part.path)
+        parts = parts_of(own)
+        self._next = parts[-1].number + 1 if parts else 0
+        for part in reversed(parts):
             if self._durable is None:
                 self._durable = last_sequence(part.path)
+            repair(part.path)
         for folder in recordings_of(self._plan.site_folder):
             if not in_use(folder):
                 _repair_all(folder)
@@ -236,16 +240,22 @@ def _repair_all(folder: Path) -> None:
 
 
 def repair(path: Path) -> None:
-    """A whole file in the place of a cut one; one without any whole chunk stays as it is."""
+    """A whole file in the place of a cut one. One that was cut before its first chunk was written
+    holds nothing, and goes.
+    """
     if contents(path) is not None:
         return
     whole = path.with_name(path.name + ".whole")
     whole.unlink(missing_ok=True)
-    with contextlib.suppress(InputError):
+    try:
         recover([path], whole)
-        stat = path.stat()
-        os.utime(whole, ns=(stat.st_atime_ns, stat.st_mtime_ns))  # its age counts in the ring
-        whole.replace(path)
+    except NothingSaved:
+        if path.stat().st_size < NOTHING:
+            path.unlink()
+        return
+    stat = path.stat()
+    os.utime(whole, ns=(stat.st_atime_ns, stat.st_mtime_ns))  # its age counts in the ring
+    whole.replace(path)
 
 
 def last_sequence(path: Path) -> int | None:
@@ -273,6 +283,7 @@ def run(connection: Connection, plan: Plan) -> None:
     terminated: list[float] = []
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's to answer
     signal.signal(signal.SIGTERM, lambda *_: terminated.append(time.monotonic()))
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
     with contextlib.suppress(OSError):
         os.nice(NICENESS)
     keeper = Keeper(plan)

@@ -13,6 +13,7 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
+from backend.errors import InputError
 from backend.fusion.samples import ClockSample
 from backend.pipeline.records import Inputs, Notice, Snapshot
 from backend.shell.link.receiver import Heard
@@ -31,6 +32,7 @@ from backend.shell.session.format import (
 from backend.shell.session.keeper import Plan, run
 from backend.shell.session.near_miss import NearMiss, NearMisses
 
+ACTIONS = 50  # recorded in a second, at most
 MAX_TEXT = 500  # of a marker
 ROTATE = 2.0  # a pin waits so long for its last part to be finished [s]
 
@@ -50,6 +52,8 @@ class Recorder:
     that of the snapshots; target: the writing process's body, for tests.
     """
 
+    wants_everything = True  # that arrives, also what no cycle consumes
+
     def __init__(
         self,
         plan: Plan,
@@ -64,6 +68,8 @@ class Recorder:
         self._misses = NearMisses(stop_below)
         self._heard: tuple[Heard | ClockSample, ...] = ()
         self._began = ""
+        self._alarms = ""
+        self._actions = (0, 0)  # of this second
 
     def hear(self, items: tuple[Heard | ClockSample, ...]) -> None:
         """What arrived for the next cycle; called by the fast loop."""
@@ -95,12 +101,19 @@ class Recorder:
         self._feeder.put([(SNAPSHOT, "", stamp(at, self._offset), text.encode())])
 
     def alarms(self, text: str, at: float) -> None:
-        """The JSON list of alarms as published, whenever it changed. at: the snapshot's time [s]"""
+        """The JSON list of alarms as published, kept when it changed. at: of the snapshot [s]."""
+        if text == self._alarms:
+            return
+        self._alarms = text
         data = b'{"alarms":' + text.encode() + b"}"
         self._feeder.put([(ALARM, "", stamp(at, self._offset), data)])
 
     def action(self, action: str, page: str | None, details: dict[str, Any]) -> None:
-        """What an operator did on a page."""
+        """What an operator did on a page. A page that floods is recorded in part."""
+        second = int(self._clock())
+        self._actions = (second, self._actions[1] + 1 if self._actions[0] == second else 1)
+        if self._actions[1] > ACTIONS:
+            return
         self._put_now(ACTION, {"action": action, "page": page or "", "details": details})
 
     def mark(self, kind: str, text: str, **more: Any) -> None:
@@ -144,6 +157,45 @@ class Recorder:
         except ValueError:  # a page sent what is not a number
             return
         self._feeder.put([(topic, "", stamp(self._clock(), self._offset), dumps(document))])
+
+
+class NoRecorder:
+    """In the place of a recorder when nothing is recorded. why: in words."""
+
+    wants_everything = False
+
+    def __init__(self, why: str) -> None:
+        self._why = why
+
+    def hear(self, items: tuple[Heard | ClockSample, ...]) -> None: ...
+
+    def after_cycle(self, inputs: Inputs, snapshot: Snapshot) -> None: ...
+
+    def notices(self) -> tuple[Notice, ...]:
+        return ()
+
+    def snapshot(self, text: str, at: float) -> None: ...
+
+    def alarms(self, text: str, at: float) -> None: ...
+
+    def action(self, action: str, page: str | None, details: dict[str, Any]) -> None: ...
+
+    def mark(self, kind: str, text: str, **more: Any) -> None:
+        raise InputError(f"nothing is recorded: {self._why}.")
+
+    def pin(self, name: str, seconds: float) -> Path:
+        raise InputError(f"nothing is recorded: {self._why}.")
+
+    def state(self) -> State:
+        return State("off", self._why)
+
+    @property
+    def pid(self) -> None:
+        return None
+
+    def start(self) -> None: ...
+
+    def close(self) -> None: ...
 
 
 def _clock_text(item: ClockSample) -> bytes:

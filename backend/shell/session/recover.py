@@ -1,4 +1,4 @@
-"""What can be read of a cut or damaged MCAP file, chunk by chunk, and a whole file made of it."""
+"""What can be read of a cut or damaged MCAP file, and a whole file made of it."""
 
 from __future__ import annotations
 
@@ -230,13 +230,17 @@ class _Damage(Exception):  # noqa: N818 - a fact about a file
     """A record that cannot be read; the text says why."""
 
 
+class NothingSaved(InputError):  # noqa: N818 - a fact about a file
+    """The files are of the right kind, but hold no whole chunk."""
+
+
 def recover(
     paths: list[Path], out: Path, progress: Callable[[float], None] = lambda _: None
 ) -> list[Saved]:
     """Writes all that can be read of `paths`, in this order, into one whole new file `out`.
 
-    Raises InputError when a file is of another kind, when nothing can be saved, and when `out`
-    exists or cannot be written. The originals stay as they are.
+    Raises InputError when a file is of another kind and when `out` exists or cannot be written;
+    NothingSaved when there is nothing to be saved. The originals stay as they are.
     """
     if out.exists():
         raise InputError(f"{out}: exists already; allowed is the name of a new file.")
@@ -257,7 +261,7 @@ def recover(
             results.append(damaged.saved)
         if copy is None:
             names = ", ".join(str(path) for path in paths)
-            raise InputError(f"{names}: holds no whole chunk of messages; nothing can be saved.")
+            raise NothingSaved(f"{names}: holds no whole chunk of messages; nothing can be saved.")
         copy.file.close()
         partial.rename(out)
     except OSError as error:
