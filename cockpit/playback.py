@@ -35,7 +35,8 @@ from backend.shell.session.index import Index
 from backend.shell.session.player import MODE, Player
 from backend.shell.session.reader import Session, open_session
 from backend.site.site import Site, load_site, parse_site, shipped_sites
-from cockpit.desk import LOOPBACK, Desk, image_loops, load_models, make_config, resolutions
+from cockpit.desk import LOOPBACK, Desk, image_loops, load_models, make_config
+from cockpit.resolutions import resolutions
 from cockpit.views.inputs import scene_site
 from cockpit.views.server import HEAD, View, start
 

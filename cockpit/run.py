@@ -10,6 +10,7 @@ import threading
 import time
 import webbrowser
 from collections.abc import Iterator
+from pathlib import Path
 
 from backend.shell.link.session import with_port
 from backend.site.site import Site, load_site
@@ -21,7 +22,13 @@ SETTLE = 6.0
 
 
 def run_demo(
-    site_name: str, host: str, port: int, open_browser: bool, until: threading.Event
+    site_name: str,
+    host: str,
+    port: int,
+    open_browser: bool,
+    until: threading.Event,
+    recording: bool = True,
+    record: Path | None = None,
 ) -> None:
     """Simulated machines, one process each, and a backend, until interrupted."""
     from cockpit.station import Options, Station
@@ -31,7 +38,7 @@ def run_demo(
     began = [float("inf")]
     station = Station(
         site,
-        Options(host, port, (endpoint,), (), (), "DEMO"),
+        Options(host, port, (endpoint,), (), (), "DEMO", record, recording),
         demo_began=(lambda: began[0]) if tells_a_story(site) else None,
     )
     with contextlib.closing(station):
@@ -66,6 +73,8 @@ def run_serve(
     connect: tuple[str, ...],
     own: tuple[str, ...],
     until: threading.Event,
+    recording: bool = True,
+    record: Path | None = None,
 ) -> None:
     """The cockpit on live machines, until interrupted."""
     from cockpit.station import Options, Station
@@ -74,7 +83,7 @@ def run_serve(
     listen = listen or site.link.listen or (() if connect or site.link.connect else (LIVE,))
     listen = tuple(with_port(endpoint) for endpoint in listen)
     connect = connect or site.link.connect
-    station = Station(site, Options(host, port, listen, connect, own, "LIVE"))
+    station = Station(site, Options(host, port, listen, connect, own, "LIVE", record, recording))
     with contextlib.closing(station):
         _announce(site, station.web.port, host, open_browser)
         where = [f"listening on {e}" for e in listen] + [f"connected to {e}" for e in connect]

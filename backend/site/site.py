@@ -19,6 +19,7 @@ from backend.site.tables import (
     Obstacle,
     ObstacleMesh,
     Rates,
+    Recording,
     Safety,
     SiteMachine,
     SiteTable,
@@ -45,6 +46,7 @@ class Site:
     obstacles: tuple[Obstacle, ...]
     meshes: tuple[ObstacleMesh, ...]
     link: Link
+    recording: Recording
 
     @property
     def folder(self) -> Path:
@@ -118,6 +120,7 @@ def parse_site(data: dict[str, Any], path: Path) -> Site:
         obstacles=table.obstacle,
         meshes=table.obstacle_mesh,
         link=table.link,
+        recording=table.recording,
     )
 
 

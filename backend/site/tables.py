@@ -198,6 +198,18 @@ class Link(Table):
     listen: tuple[str, ...] = ()
 
 
+class Recording(Table):
+    """What a running cockpit records. folder: of all recordings, relative to the site file; empty
+    for $EXCAVATOR_COCKPIT_RECORDINGS or ~/.local/state/excavator-cockpit/recordings. The oldest
+    parts beyond max_gib [GiB] and max_hours [h] are deleted, except those that are pinned.
+    """
+
+    enabled: bool = True
+    folder: str = ""
+    max_gib: Annotated[float, Field(ge=0.1, le=10_000.0)] = 4.0
+    max_hours: Annotated[float, Field(ge=0.1, le=10_000.0)] = 24.0
+
+
 class SiteTable(Table):
     """A whole site file."""
 
@@ -212,6 +224,7 @@ class SiteTable(Table):
     obstacle: tuple[Obstacle, ...] = ()
     obstacle_mesh: tuple[ObstacleMesh, ...] = ()
     link: Link = Link()
+    recording: Recording = Recording()
 
     @model_validator(mode="after")
     def _distinct(self) -> SiteTable:

@@ -27,6 +27,7 @@ from backend.shell.app.models import (
     WhatIfModel,
     WhatIfRequest,
 )
+from backend.shell.app.recording import RecordingSources, recording_router
 from backend.shell.app.wire import dumps
 
 STATIC = Path(__file__).resolve().parents[3] / "static"
@@ -44,7 +45,7 @@ class Sources:
 
     backend: live timings; on_message: what a page asks of the views (camera, own machine);
     what_if: judges a posture, called with a machine and joint values by role, in a worker thread;
-    raises InputError for what it does not know.
+    raises InputError for what it does not know; recording: None where nothing is ever recorded.
     """
 
     site: dict[str, Any]
@@ -52,6 +53,7 @@ class Sources:
     backend: Callable[[], dict[str, Any]]
     on_message: Callable[[dict[str, Any]], None]
     what_if: Callable[[str, dict[str, float]], dict[str, Any]]
+    recording: RecordingSources | None = None
 
 
 def create_app(
@@ -140,6 +142,8 @@ def create_app(
         await websocket.accept()
         await feed.serve(websocket)
 
+    if sources.recording is not None:
+        app.include_router(recording_router(sources.recording))
     for router in (*routers, *((viewer,) if viewer is not None else ())):
         app.include_router(router)
     app.mount("/static", StaticFiles(directory=STATIC), name="static")

@@ -111,6 +111,14 @@ class AlarmModel(BaseModel):
     active: bool = Field(description="past its on-delay")
 
 
+class NoticeModel(BaseModel):
+    """What an operator should know about the cockpit itself; not a safety level."""
+
+    key: str = Field(description="what it is about, such as recording")
+    line: str = Field(description="in words")
+    since: float = Field(description="local monotonic clock [s]")
+
+
 class FreedomModel(BaseModel):
     """One joint, one way. Bodies count as grown by eta."""
 
@@ -165,13 +173,22 @@ class SnapshotModel(BaseModel):
     margins: dict[str, MarginsModel] = Field(description="by own machine")
     concerns: list[ConcernModel]
     alarms: list[AlarmModel] = Field(description="the severest first")
+    notices: list[NoticeModel] = Field(
+        default_factory=list, description="beside the alarms, about the cockpit itself"
+    )
     images: dict[str, ImageStampModel] = Field(description="newest image by kind and pair")
     health: HealthCountersModel
     backend: BackendModel | None = Field(None, description="of the process that answers")
     resolution: dict[str, ResolutionModel] = Field(
         default_factory=dict, description="Sun 2020, Section 5.1, live"
     )
+    recording: RecordingStateModel | None = Field(None, description="of this backend")
     demo: DemoModel | None = Field(None, description="only in the demo")
+
+
+class RecordingStateModel(BaseModel):
+    state: str = Field(description="on, off or trouble")
+    text: str = Field(description="since when it is on, why it is off, or what is wrong")
 
 
 class ResolutionModel(BaseModel):
