@@ -10,7 +10,6 @@ import contextlib
 import gc
 import sys
 import tomllib
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -34,6 +33,7 @@ from backend.shell.session.cycles import Topics, problems
 from backend.shell.session.index import Index
 from backend.shell.session.player import MODE, Player
 from backend.shell.session.reader import Session, open_session
+from backend.shell.session.ring import parts_of, pins_of, recordings_of
 from backend.site.site import Site, load_site, parse_site, shipped_sites
 from cockpit.desk import LOOPBACK, Desk, image_loops, load_models, make_config
 from cockpit.resolutions import resolutions
@@ -276,10 +276,11 @@ class PlaybackStation:
             self.desk.on_message(message)
 
 
-def newest(roots: tuple[Path, ...], recordings: Callable[[Path], list[Path]]) -> Path:
-    """The newest of all recordings below some folders. Raises InputError when there is none."""
-    found = [path for root in roots for path in recordings(root)]
-    if not found:
-        where = ", ".join(str(root) for root in roots)
-        raise InputError(f"{where}: holds no recording; allowed is the path of a session.")
-    return max(found, key=lambda path: path.stat().st_mtime)
+def newest(root: Path) -> Path:
+    """What was recorded or pinned last. Raises InputError when there is nothing."""
+    sites = sorted(entry for entry in root.iterdir() if entry.is_dir()) if root.is_dir() else []
+    found = [folder for site in sites for folder in (*recordings_of(site), *pins_of(site))]
+    dated = [(parts[-1].end, folder) for folder in found if (parts := parts_of(folder))]
+    if not dated:
+        raise InputError(f"{root}: there are no recordings; allowed is the path of a session.")
+    return max(dated)[1]

@@ -5,14 +5,13 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Collection, Iterable, Iterator, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any
 
 import msgspec
 
 from backend.fusion.samples import ClockSample, Sample
-from backend.pipeline import records
-from backend.pipeline.records import ImageStamp, Inputs
+from backend.pipeline.records import ImageStamp, Inputs, Notice
 from backend.shell.link.codec import DecodeError, decode
 from backend.shell.link.messages import AgentStatus, Command, TrueState
 from backend.shell.link.topics import Direction, match
@@ -209,21 +208,14 @@ def _recorded(reader: _Reader, messages: Iterator[Message]) -> Iterator[Portion]
 
 
 def _inputs(heard: tuple[Sample, ...], cycle: dict[str, Any]) -> Inputs:
-    more: dict[str, Any] = {}
-    if cycle.get("notices") and "notices" in _INPUTS:
-        more["notices"] = tuple(_NOTICE(**notice) for notice in cycle["notices"])
     return Inputs(
         samples=heard,
         images=tuple(ImageStamp(**image) for image in cycle.get("images", ())),
         malformed=tuple((str(key), int(n)) for key, n in cycle.get("malformed", ())),
         foreign=tuple((str(key), int(n)) for key, n in cycle.get("foreign", ())),
         lost=int(cycle.get("lost", 0)),
-        **more,
+        notices=tuple(Notice(**notice) for notice in cycle.get("notices", ())),
     )
-
-
-_INPUTS = {field.name for field in fields(Inputs)}
-_NOTICE: Any = getattr(records, "Notice", None)
 
 
 def _periodic(

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -16,7 +15,6 @@ import numpy as np
 from backend.fusion.pose import FusedPose, StreamStatus, Validity
 from backend.fusion.samples import Fix
 from backend.machine.model import Machine
-from backend.pipeline import records
 from backend.pipeline.config import Config
 from backend.pipeline.place import base_transform, place
 from backend.pipeline.records import (
@@ -26,6 +24,7 @@ from backend.pipeline.records import (
     MachineMargins,
     MachineState,
     Motion,
+    Notice,
     PairDistance,
     Snapshot,
 )
@@ -59,9 +58,6 @@ def _snapshot(document: Document, config: Config) -> Snapshot:
         if one["machine"] in known
     )
     health = document.get("health", {})
-    more: dict[str, Any] = {}
-    if document.get("notices") and "notices" in _SNAPSHOT:
-        more["notices"] = tuple(_NOTICE(**notice) for notice in document["notices"])
     state_time = float(document["state_time"])
     return Snapshot(
         time=float(document["time"]),
@@ -95,12 +91,8 @@ def _snapshot(document: Document, config: Config) -> Snapshot:
             for name, one in document.get("margins", {}).items()
             if name in known
         },
-        **more,
+        notices=tuple(Notice(**notice) for notice in document.get("notices", ())),
     )
-
-
-_SNAPSHOT = {field.name for field in fields(Snapshot)}
-_NOTICE: Any = getattr(records, "Notice", None)
 
 
 def _machine(name: str, one: Document, machine: Machine, state_time: float) -> MachineState:
