@@ -12,6 +12,7 @@ from typing import Annotated
 import typer
 
 from backend.errors import InputError
+from cockpit.cli_playback import add_commands
 from cockpit.cli_recordings import recordings
 
 app = typer.Typer(
@@ -225,6 +226,9 @@ def _interrupted() -> threading.Event:
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: event.set())
     return event
+
+
+add_commands(app, _interrupted)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -10,6 +10,7 @@ from backend.documents.assessment import AssessmentDocument
 from backend.documents.bench import BenchDocument
 from backend.documents.cspace import CspaceDocument
 from backend.documents.recordings import RecordingsDocument, RecoverDocument
+from backend.documents.session import DiffDocument, SeriesDocument, SessionDocument
 from backend.documents.state import StateDocument
 from backend.errors import InputError
 from backend.shell.app.models import HealthModel, SiteModel, SnapshotModel
@@ -27,6 +28,9 @@ SCHEMAS: dict[str, tuple[type[BaseModel], str]] = {
     "snapshot": (SnapshotModel, "/api/snapshot and the Zenoh key cockpit/snapshot"),
     "site": (SiteModel, "/api/site"),
     "health": (HealthModel, "/api/health"),
+    "session": (SessionDocument, "/api/session"),
+    "series": (SeriesDocument, "/api/session/series"),
+    "diff": (DiffDocument, "what diff --json prints, and /api/session/diff"),
     "site-file": (SiteTable, "a site file, as TOML"),
 }
 
