@@ -157,6 +157,28 @@ def cspace(
 
 
 @app.command()
+def convert(
+    recording: Annotated[
+        Path, typer.Argument(help="rosbag2 folder or file, CAN log, or table of poses.")
+    ],
+    site: Site,
+    out: Annotated[Path, typer.Option(help="The .mcap file to write.")],
+    dbc: Annotated[
+        Path | None, typer.Option(help="CAN logs: the DBC; omitted: the one the map names.")
+    ] = None,
+    map_: Annotated[
+        Path | None,
+        typer.Option("--map", help="CAN logs: which signal is what; a shipped name or a file."),
+    ] = None,
+    json_: Annotated[bool, typer.Option("--json", help="Print JSON instead of words.")] = False,
+) -> None:
+    """Turn another program's recording into a session that this one plays."""
+    from cockpit.convert import run_convert
+
+    run_convert(recording, site, out, dbc, map_, json_)
+
+
+@app.command()
 def schema(
     name: Annotated[
         str, typer.Argument(help="Document's name; without it the names are listed.")
