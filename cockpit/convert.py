@@ -22,7 +22,9 @@ def run_convert(
 ) -> None:
     """Prints what came out. Raises InputError for what cannot be read."""
     site = load_site(site_name)
-    with Progress(console=Console(stderr=True), transient=True, disable=as_json) as bar:
+    console = Console(stderr=True)
+    silent = as_json or not console.is_terminal
+    with Progress(console=console, transient=True, disable=silent) as bar:
         task = bar.add_task(f"reading {recording.name}", total=1.0)
         done = convert(
             recording, site, out, lambda part: bar.update(task, completed=part), dbc, can_map

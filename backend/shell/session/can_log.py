@@ -119,8 +119,9 @@ def _messages(
             value = float(values[target.signal])
             taken, messages = target.streams.update(time, target.name, value)
             if not taken:
-                text = f"{frame.arbitration_id} {target.signal} = {value:g} is kept out: an outlier"
-                problems.add(f"{where}, {time / 1e9:.3f} s", text, kind=f"outlier {target.signal}")
+                signal = f"{target.message.name}.{target.signal}"
+                text = f"{frame.arbitration_id} {signal} = {value:g} is kept out: an outlier"
+                problems.add(f"{where}, {time / 1e9:.3f} s", text, kind=f"outlier {signal}")
                 events.append(Event(time, target.machine, text))
             yield from messages
     if total and not known:

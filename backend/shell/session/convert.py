@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.metadata import version
 from itertools import chain
 from pathlib import Path
@@ -50,15 +50,18 @@ def convert(
     progress: Progress | None = None,
     dbc: Path | None = None,
     can_map: Path | None = None,
+    note: str = "",
 ) -> Conversion:
     """Writes `path` as a session to `out`, which must not exist.
 
-    dbc, can_map: for CAN logs; default: what the site file names. Raises InputError, and leaves no
+    dbc, can_map: for CAN logs; default: what the site file names. note: what a viewer must know, in
+    place of the source's own. Raises InputError, and leaves no
     file behind then.
     """
     if out.exists():
         raise InputError(f"{out}: exists already; allowed is a new file.")
     source = open_source(path, site, progress, dbc, can_map)
+    source = replace(source, note=note) if note else source
     first = next(source.messages, None)
     if first is None:
         reasons = source.problems.found()
