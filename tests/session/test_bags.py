@@ -186,6 +186,17 @@ def test_cut_bags_are_told_never_a_traceback(
         assert document["problems"]
 
 
+def test_what_is_whole_of_a_cut_mcap_is_kept(tmp_path: Path) -> None:
+    bag = write_bag(tmp_path / "bag", messages("/left", 40_000), StoragePlugin.MCAP)
+    (file,) = bag.glob("*.mcap")
+    data = file.read_bytes()
+    file.write_bytes(data[: len(data) // 2])
+    for path in (bag, file):
+        done = convert(path, load_site("demo"), tmp_path / f"{path.name}.out.mcap")
+        assert 0.3 * 70_000 < done.messages < 0.6 * 70_000
+        assert any("damaged" in problem.text for problem in done.problems)
+
+
 def test_missing_streams_and_strangers_are_told(tmp_path: Path) -> None:
     content = [m for m in messages("/left") if "joint" in m[0]] + messages("/third")
     bag = write_bag(tmp_path / "bag", content)

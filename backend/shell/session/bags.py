@@ -5,6 +5,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Iterator
 from contextlib import ExitStack
+from dataclasses import dataclass
 from heapq import merge
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,7 @@ from backend.fusion.samples import JointSample
 from backend.shell.link.codec import DecodeError, decode
 from backend.shell.session.format import OWN, Message
 from backend.shell.session.mapping import Mapped, Stream, map_topics, refuse_nothing
+from backend.shell.session.reader import Session, open_session
 from backend.shell.session.source import Problems, Progress, Source, SteadyClock
 from backend.site.site import Site
 
@@ -127,12 +129,18 @@ def _open(path: Path, stack: ExitStack, problems: Problems) -> list[Any]:
     if path.is_dir() and not (path / METADATA_FILE).exists():
         paths = _files(path)
         problems.add(path.name, f"has no {METADATA_FILE}; its files are read one by one")
-    readers, reasons = [], []
+    readers: list[Any] = []
+    reasons = []
     for file in paths:
         try:
             readers.append(stack.enter_context(Reader(file)))
         except Exception as error:  # whatever a foreign file provokes in its reader
-            reasons.append((file, _reason(error)))
+            damaged = _Damaged.opened(file)
+            if damaged is not None:
+                problems.add(file.name, f"is damaged ({_reason(error)}); what is whole is read")
+                readers.append(damaged)
+            else:
+                reasons.append((file, _reason(error)))
     if not readers:
         stack.close()
         file, reason = reasons[0]
@@ -143,6 +151,42 @@ def _open(path: Path, stack: ExitStack, problems: Problems) -> list[Any]:
     for file, reason in reasons:
         problems.add(file.name, f"cannot be read: {reason}")
     return readers
+
+
+@dataclass(frozen=True)
+class _Topic:
+    topic: str
+    msgtype: str
+    msgcount: int
+
+
+class _Damaged:
+    """An MCAP file that was never closed, or its like, with what `rosbags` has for a whole one."""
+
+    def __init__(self, path: Path, session: Session) -> None:
+        self.path = path
+        self._session = session
+        self.connections = [
+            _Topic(name, info.type, info.count)
+            for name, info in session.topics.items()
+            if info.encoding == "cdr"
+        ]
+
+    @staticmethod
+    def opened(path: Path) -> _Damaged | None:
+        """None for what is no MCAP, or has nothing left to read."""
+        files = sorted(path.glob("*.mcap")) if path.is_dir() else [path]
+        if not files or any(file.suffix != ".mcap" for file in files):
+            return None
+        try:
+            return _Damaged(path, open_session(path))
+        except InputError:
+            return None
+
+    def messages(self, connections: list[_Topic]) -> Iterator[tuple[_Topic, int, bytes]]:
+        known = {connection.topic: connection for connection in connections}
+        for message in self._session.messages(topics=known):
+            yield known[message.topic], message.time, message.data
 
 
 def _files(folder: Path) -> list[Path]:
