@@ -53,13 +53,13 @@ class Damaged(Exception):  # noqa: N818 - told to the reader, who skips the chun
 
 @dataclass
 class File:
-    """One file's table of contents. topics: by channel id: (topic, type, encoding); counts: by
-    channel id; metadata: by name; note: what is wrong with the file, else empty.
+    """One file's table of contents. topics: (topic, schema id, encoding) by channel id; schemas:
+    names by id; counts: messages by channel id; metadata: by name; note: what is wrong, else empty.
     """
 
     path: Path
     chunks: list[Chunk] = field(default_factory=list)
-    topics: dict[int, tuple[str, str, str]] = field(default_factory=dict)
+    topics: dict[int, tuple[str, int, str]] = field(default_factory=dict)
     schemas: dict[int, str] = field(default_factory=dict)
     counts: dict[int, int] = field(default_factory=dict)
     metadata: dict[str, dict[str, str]] = field(default_factory=dict)
@@ -93,8 +93,8 @@ class File:
                 self.schemas.setdefault(schema.id, schema.name)
             elif opcode == Opcode.CHANNEL:
                 channel = Channel.read(stream)
-                name = self.schemas.get(channel.schema_id, "")
-                self.topics.setdefault(channel.id, (channel.topic, name, channel.message_encoding))
+                entry = (channel.topic, channel.schema_id, channel.message_encoding)
+                self.topics.setdefault(channel.id, entry)
             elif opcode == Opcode.METADATA:
                 metadata = Metadata.read(stream)
                 self.metadata.setdefault(metadata.name, metadata.metadata)
@@ -148,8 +148,8 @@ def summary(path: Path, stream: IO[bytes], size: int) -> File | None:
             metadata.append(struct.unpack_from("<QQ", body))
         else:
             file.learn(opcode, body)
-    if not file.chunks and (any(file.counts.values()) or not file.topics):
-        return None  # messages outside of chunks, or a summary without an index
+    if bool(file.chunks) != any(file.counts.values()) or not (file.chunks or file.topics):
+        return None  # messages outside of chunks, or not counted
     for offset, length in metadata:
         stream.seek(offset)
         for opcode, body in records(stream.read(min(length, LARGEST))):

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from bisect import bisect_left
+from collections import Counter
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, field
 from itertools import groupby, islice
@@ -279,7 +280,7 @@ def _joined(
         end=max(part.end for part in parts),
         _files=files,
         _timeline=line,
-        _notes=[*notes, *line.notes, *_missing(headers)][:MOST_NOTES],
+        _notes=[*notes, *line.notes, *_missing(headers), *_shared(files)][:MOST_NOTES],
     )
 
 
@@ -297,11 +298,23 @@ def _missing(headers: list[Header | None]) -> list[str]:
     return found
 
 
+def _shared(files: list[File]) -> list[str]:
+    """Topics that several senders published on: two machines may go by one name."""
+    found = set()
+    for file in files:
+        names = Counter(topic for topic, _, _ in file.topics.values())
+        found |= {topic for topic, senders in names.items() if senders > 1}
+    return [
+        f"{topic}: several senders shared this topic; are there two machines with one name?"
+        for topic in sorted(found)
+    ]
+
+
 def _topics(files: list[File]) -> dict[str, TopicInfo]:
     found: dict[str, TopicInfo] = {}
     for file in files:
-        for channel, (topic, kind, encoding) in file.topics.items():
-            known = found.get(topic)
+        for channel, (topic, schema, encoding) in file.topics.items():
+            known, kind = found.get(topic), file.schemas.get(schema, "")
             count = file.counts.get(channel, 0) + (known.count if known else 0)
             found[topic] = TopicInfo(kind, encoding, count)
     return dict(sorted(found.items()))

@@ -76,7 +76,7 @@ class Timeline:
             else:
                 stretch = self._plain(number, chunk)
             self.stretches.append(stretch)
-            self.reached.append(max(stretch.end, *self.reached[-1:]))
+            self.reached.append(max([stretch.end, *self.reached[-1:]]))
             self.shift = stretch.shifts[-1][1]
         if self.shift > before:
             self.notes.append(

@@ -84,6 +84,7 @@ class _Walker:
 
     def close(self) -> None:
         """After the last record."""
+        self.seen = {}  # the indexes of a chunk that is still open may be cut off: count it
         self._close_chunk()
         self._close_run()
 
