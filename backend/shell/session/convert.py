@@ -14,7 +14,7 @@ from backend.shell.session import bags, can_log, pose_tables
 from backend.shell.session.format import MARKER, Header, Message, dumps
 from backend.shell.session.source import Event, Problem, Progress, Source
 from backend.shell.session.writer import SessionWriter
-from backend.site.site import Site
+from backend.site.site import SITES, Site
 
 ALLOWED = (
     "rosbag2 folders and files (.db3, .mcap), CAN logs (.asc, .blf, .csv, .log) and tables of "
@@ -118,7 +118,7 @@ def _write(
         offset=first.time // 1_000_000_000 * 1_000_000_000,
         recording=out.stem,
         part=0,
-        site_file=str(site.path),
+        site_file=_site_file(site),
         site=site.path.read_text(encoding="utf-8"),
         own=",".join(machine.name for machine in site.machines),
         origin=source.origin,
@@ -141,6 +141,11 @@ def _write(
     finally:
         writer.close()
     return counts, end
+
+
+def _site_file(site: Site) -> str:
+    """A shipped site's path as it is in every installation; another's as it is here."""
+    return f"scenes/sites/{site.path.name}" if site.path.parent == SITES else str(site.path)
 
 
 def _with_events(first: Message, source: Source) -> Iterator[Message]:
