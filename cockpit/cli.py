@@ -179,6 +179,29 @@ def convert(
 
 
 @app.command()
+def export(
+    session: Annotated[Path, typer.Argument(help="Session: a file or a folder of files.")],
+    format_: Annotated[str, typer.Option("--format", help="csv, parquet or ros2.")],
+    out: Annotated[Path, typer.Option(help="The folder to write.")],
+    site: Annotated[
+        str | None, typer.Option(help="Site, where the session does not hold its own.")
+    ] = None,
+    source: Annotated[
+        str,
+        typer.Option(
+            help="Tables of what was recorded, or of what is evaluated now; the default "
+            "is recorded where there are snapshots."
+        ),
+    ] = "",
+    json_: Annotated[bool, typer.Option("--json", help="Print JSON instead of words.")] = False,
+) -> None:
+    """Write a session as tables of poses, clearances and alarms, or as a ROS 2 recording."""
+    from cockpit.export import run_export
+
+    run_export(session, format_, out, site, source, json_)
+
+
+@app.command()
 def schema(
     name: Annotated[
         str, typer.Argument(help="Document's name; without it the names are listed.")

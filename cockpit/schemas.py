@@ -8,7 +8,7 @@ from pydantic import BaseModel
 
 from backend.documents.assessment import AssessmentDocument
 from backend.documents.bench import BenchDocument
-from backend.documents.conversion import ConversionDocument
+from backend.documents.conversion import ConversionDocument, ExportDocument
 from backend.documents.cspace import CspaceDocument
 from backend.documents.state import StateDocument
 from backend.errors import InputError
@@ -20,6 +20,7 @@ SCHEMAS: dict[str, tuple[type[BaseModel], str]] = {
     "assess": (AssessmentDocument, "what assess prints"),
     "cspace": (CspaceDocument, "what cspace --json prints"),
     "convert": (ConversionDocument, "what convert --json prints"),
+    "export": (ExportDocument, "what export --json prints"),
     "bench": (BenchDocument, "what bench --json prints"),
     "snapshot": (SnapshotModel, "/api/snapshot and the Zenoh key cockpit/snapshot"),
     "site": (SiteModel, "/api/site"),

@@ -1,4 +1,4 @@
-"""What `cockpit convert --json` prints."""
+"""What `cockpit convert --json` and `cockpit export --json` print."""
 
 from __future__ import annotations
 
@@ -29,3 +29,14 @@ class ConversionDocument(BaseModel):
     skipped: dict[str, int] = Field(
         description="topics, identifiers, machines or columns that are not of the site, with counts"
     )
+
+
+class ExportDocument(BaseModel):
+    """A session as tables or as a plain ROS 2 recording; what `cockpit export --json` prints."""
+
+    session: str = Field(description="path of what was read")
+    out: str = Field(description="path of the folder written")
+    format: str = Field(description="csv, parquet or ros2")
+    source: str = Field(description="recorded, or evaluated by today's pipeline")
+    counts: dict[str, int] = Field(description="rows by file, or messages by topic")
+    notes: list[str] = Field(description="what could not be read or written, in words")

@@ -31,9 +31,7 @@ RIGHT = "{t},right,10,0.7,-1.3,0.1,308610,4129946,0,-120,0,0,0.02"
 
 
 def long_table(count: int = 20) -> str:
-    rows = [
-        row.format(t=f"{START + 0.05 * k:.3f}") for k in range(count) for row in (LEFT, RIGHT)
-    ]
+    rows = [row.format(t=f"{START + 0.05 * k:.3f}") for k in range(count) for row in (LEFT, RIGHT)]
     return "\n".join([HEADER, *rows]) + "\n"
 
 
@@ -53,9 +51,7 @@ def fused(done: Conversion, machine: str) -> FusedPose:
 def check(done: Conversion) -> None:
     frame = load_site("demo").frame
     left, right = fused(done, "left"), fused(done, "right")
-    assert frame.to_projected(left.position) == pytest.approx(
-        [308604.5, 4129954.25, 1.5], abs=1e-5
-    )
+    assert frame.to_projected(left.position) == pytest.approx([308604.5, 4129954.25, 1.5], abs=1e-5)
     assert np.degrees([left.yaw, left.pitch, left.roll]) == pytest.approx([40, 3, -2], abs=1e-6)
     assert left.joints == pytest.approx([np.radians(-30), 0.5, -1.1, -0.4])
     assert frame.to_projected(right.position) == pytest.approx([308610, 4129946, 0], abs=1e-5)
@@ -78,7 +74,9 @@ def test_latitude_and_longitude(tmp_path: Path) -> None:
     latitude, longitude, altitude = frame.to_geodetic(
         frame.from_projected(np.array([308604.5, 4129954.25, 1.5]))
     )
-    text = long_table().replace("easting_m,northing_m,height_m", "latitude_deg,longitude_deg,altitude_m")
+    text = long_table().replace(
+        "easting_m,northing_m,height_m", "latitude_deg,longitude_deg,altitude_m"
+    )
     text = text.replace("308604.5,4129954.25,1.5", f"{latitude!r},{longitude!r},{altitude!r}")
     latitude, longitude, altitude = frame.to_geodetic(
         frame.from_projected(np.array([308610.0, 4129946.0, 0.0]))
@@ -90,9 +88,7 @@ def test_latitude_and_longitude(tmp_path: Path) -> None:
 
 def wide_columns() -> dict[str, Any]:
     names = HEADER.split(",")
-    columns: dict[str, Any] = {
-        "time_ns": [int(START) * 10**9 + k * 50_000_001 for k in range(20)]
-    }
+    columns: dict[str, Any] = {"time_ns": [int(START) * 10**9 + k * 50_000_001 for k in range(20)]}
     for row in (LEFT, RIGHT):
         values = row.format(t=0).split(",")
         for name, value in zip(names[2:], values[2:], strict=True):

@@ -36,6 +36,8 @@ altitude (ellipsoidal): of the same point; yaw: of the tracks, counter-clockwise
 pitch: positive raises the front; joints: the URDF's own values, by role.
 """
 MACHINE = "machine"
+VALIDITY = "validity"
+"""Of long tables, may be left out: rows that are not VALID are not taken."""
 
 
 @dataclass(frozen=True)
@@ -73,7 +75,7 @@ def read_layout(names: Sequence[str], site: Site, where: str) -> Layout:
     long = MACHINE in names
     known = [machine.name for machine in site.machines]
     for name in names:
-        if name in TIMES or name == MACHINE:
+        if name in TIMES or name == MACHINE or (long and name == VALIDITY):
             continue
         machine, column = ("", name) if long else _split(name)
         if column in COLUMNS and (long or machine in known):

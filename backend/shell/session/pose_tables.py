@@ -11,7 +11,7 @@ import numpy as np
 from backend.errors import InputError
 from backend.machine.model import ROLES
 from backend.shell.session.format import Message
-from backend.shell.session.pose_columns import MACHINE, Layout, read_layout
+from backend.shell.session.pose_columns import MACHINE, VALIDITY, Layout, read_layout
 from backend.shell.session.pose_messages import SIGMA_POSITION, SIGMA_YAW, PoseMessages
 from backend.shell.session.source import Problems, Progress, Source
 from backend.shell.session.table_file import column_names, numbers, read_columns, where
@@ -142,7 +142,7 @@ class _Rows:
 
 
 def _wanted(layout: Layout) -> set[str]:
-    return {*layout.numeric, *([MACHINE] if layout.long else [])}
+    return {*layout.numeric, *((MACHINE, VALIDITY) if layout.long else ())}
 
 
 def _times(column: Array, layout: Layout, path: Path) -> Any:
@@ -184,7 +184,16 @@ def _machines(
             problems.add(
                 where(path, row), f'machine "{name}" is not of the site', kind=f"machine {name}"
             )
-    return [name if name in known else "" for name in names]
+    valid = [True] * len(names)
+    if VALIDITY in table.column_names:
+        valid = [value == "VALID" for value in table.column(VALIDITY).to_pylist()]
+        if False in valid:
+            problems.add(
+                where(path, valid.index(False)),
+                "rows that are not VALID are left out",
+                count=valid.count(False),
+            )
+    return [n if n in known and good else "" for n, good in zip(names, valid, strict=True)]
 
 
 def _in_time(times: Any, machines: list[str] | None, path: Path, problems: Problems) -> Any:
