@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import struct
 from collections.abc import Iterator
 from contextlib import ExitStack
@@ -45,10 +46,19 @@ def read_bag(path: Path, site: Site, progress: Progress | None = None) -> Source
     readers = _open(path, stack, problems)
     types: dict[str, str] = {}
     counts: dict[str, int] = {}
+    senders: dict[int, set[str]] = {}
     for reader in readers:
         for connection in reader.connections:
             if connection.topic.startswith(OWN):
-                continue
+                stack.close()
+                raise InputError(f"{path}: is a session already; allowed are other recordings.")
+            if connection.topic in senders.setdefault(id(reader), set()):
+                problems.add(
+                    connection.topic,
+                    "several senders shared this topic; are there two machines with one name?",
+                    kind=f"{connection.topic} shared",
+                )
+            senders[id(reader)].add(connection.topic)
             counts[connection.topic] = counts.get(connection.topic, 0) + connection.msgcount
             known = types.setdefault(connection.topic, connection.msgtype)
             if known != connection.msgtype:
@@ -137,7 +147,10 @@ def _open(path: Path, stack: ExitStack, problems: Problems) -> list[Any]:
         except Exception as error:  # whatever a foreign file provokes in its reader
             damaged = _Damaged.opened(file)
             if damaged is not None:
-                problems.add(file.name, f"is damaged ({_reason(error)}); what is whole is read")
+                problems.add(
+                    file.name,
+                    f"is not as rosbags wants it ({_reason(error)}); what is whole is read",
+                )
                 readers.append(damaged)
             else:
                 reasons.append((file, _reason(error)))
@@ -179,9 +192,12 @@ class _Damaged:
         if not files or any(file.suffix != ".mcap" for file in files):
             return None
         try:
-            return _Damaged(path, open_session(path))
+            session = open_session(path)
         except InputError:
             return None
+        if session.headers:
+            raise InputError(f"{path}: is a session already; allowed are other recordings.")
+        return _Damaged(path, session)
 
     def messages(self, connections: list[_Topic]) -> Iterator[tuple[_Topic, int, bytes]]:
         known = {connection.topic: connection for connection in connections}
@@ -233,10 +249,13 @@ class _Check:
 def _finite(sample: Any) -> bool:
     if isinstance(sample, JointSample):
         return bool(np.isfinite(sample.position).all() and np.isfinite(sample.velocity).all())
-    values = [
-        value for name, value in vars(sample).items() if name not in ("machine", "fix", "link")
-    ]
-    return all(np.isfinite(value).all() for value in values)
+    for value in vars(sample).values():
+        if isinstance(value, float):
+            if not math.isfinite(value):
+                return False
+        elif isinstance(value, np.ndarray) and not np.isfinite(value).all():
+            return False
+    return True
 
 
 def _stamp(data: bytes) -> int:

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from backend.fusion.motion import tilt as root_tilt
 from backend.fusion.rig import make_rig
 from backend.machine.load import load_machine
 from backend.machine.model import Machine
@@ -24,7 +25,6 @@ from backend.shell.link.encode import (
 )
 from backend.shell.session.format import Message
 from backend.site.site import Site
-from backend.spatial.rotation import from_attitude, to_quaternion
 from backend.spatial.types import Array
 
 SIGMA_POSITION = 0.02  # [m], where nothing else is stated: RTK, Sun 2020, Section 5.1
@@ -71,7 +71,10 @@ class PoseMessages:
         self, position: Array, attitude: tuple[float, float, float], swing: float
     ) -> tuple[float, float, float]:
         """Latitude, longitude [deg] and ellipsoidal height [m] of the antenna."""
-        lever = from_attitude(*attitude) @ self._rig.antenna.at(np.array([swing]))[0]
+        yaw, pitch, roll = attitude
+        x, y, z = (root_tilt(pitch, roll) @ self._rig.antenna.at(np.array([swing]))[0]).tolist()
+        c, s = math.cos(yaw), math.sin(yaw)
+        lever = np.array([c * x - s * y, s * x + c * y, z])
         return self.site.frame.to_geodetic(np.asarray(position) + lever)
 
     def heading_sensor(
@@ -94,14 +97,14 @@ class PoseMessages:
     ) -> Message:
         """The heading sensor's reading for a base of this attitude (yaw, pitch, roll) [rad]."""
         yaw, pitch, roll = attitude
-        axis = from_attitude(0.0, pitch, roll) @ self._rig.forward.at(np.array([swing]))[0]
+        axis = root_tilt(pitch, roll) @ self._rig.forward.at(np.array([swing]))[0]
         heading = yaw + math.atan2(axis[1], axis[0])
         return self.heading_sensor(time, heading, sigma, position)
 
     def tilt(self, time: int, pitch: float, roll: float, yaw: float = 0.0) -> Message:
         """Pitch and roll of the tracks [rad], as an IMU on the base gives them."""
         variances = (SIGMA_TILT**2, SIGMA_TILT**2, math.pi**2)
-        turn = to_quaternion(from_attitude(yaw, pitch, roll))
+        turn = _quaternion(yaw, pitch, roll)
         data = encode_imu(time / 1e9, "base", turn, np.zeros(3), variances)
         return self._message(time, "imu/base", data)
 
@@ -114,6 +117,21 @@ class PoseMessages:
 
     def _message(self, time: int, suffix: str, data: bytes) -> Message:
         return Message(f"/{self._prefix}/{suffix}", time, data)
+
+
+def _quaternion(yaw: float, pitch: float, roll: float) -> Array:
+    """(4,) w, x, y, z of Rz(yaw) Ry(-pitch) Rx(roll), written out: tables have many rows."""
+    cy, sy = math.cos(yaw / 2), math.sin(yaw / 2)
+    cp, sp = math.cos(-pitch / 2), math.sin(-pitch / 2)
+    cr, sr = math.cos(roll / 2), math.sin(roll / 2)
+    return np.array(
+        [
+            cr * cp * cy + sr * sp * sy,
+            sr * cp * cy - cr * sp * sy,
+            cr * sp * cy + sr * cp * sy,
+            cr * cp * sy - sr * sp * cy,
+        ]
+    )
 
 
 @lru_cache(maxsize=16)
