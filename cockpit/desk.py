@@ -8,11 +8,9 @@ from collections.abc import Callable
 from dataclasses import asdict
 from typing import Any
 
-import numpy as np
 from rich.console import Console
 from rich.progress import Progress
 
-from backend.cspace.resolution import resolution
 from backend.errors import InputError
 from backend.machine.load import load_machine
 from backend.machine.model import Machine
@@ -87,12 +85,22 @@ def image_loops(site: Site, config: Config, closing: contextlib.ExitStack) -> tu
 
 
 class Desk:
-    """Answers pages: what-if, ghosts, cameras, heights of reach images. view: the 3D scene's."""
+    """Answers pages: what-if, ghosts, cameras, heights of reach images.
 
-    def __init__(self, config: Config, hub: Hub, view: Callable[[], View]) -> None:
+    view: the 3D scene's; action: told what an operator did, on which page, with what details.
+    """
+
+    def __init__(
+        self,
+        config: Config,
+        hub: Hub,
+        view: Callable[[], View],
+        action: Callable[[str, str | None, dict[str, Any]], None] = lambda *_: None,
+    ) -> None:
         self._config = config
         self._hub = hub
         self._view = view
+        self._action = action
         self._tip_heights: dict[str, float] = {}
 
     def wishes(self) -> Wishes:
@@ -108,6 +116,7 @@ class Desk:
         if snapshot is None:
             raise InputError("no cycle has finished yet; try again.")
         q = self._posture(own, joints, snapshot)
+        self._action("whatif", None, {"machine": own, "joints": joints})
         found = what_if(snapshot, self._config, own, q)
         roles = [joint.role for joint in self._config.machines[own].joints]
         posture = dict(zip(roles, q.tolist(), strict=True))
@@ -119,6 +128,8 @@ class Desk:
         kind = message.get("type")
         if not (page is None or isinstance(page, str)):
             return
+        if isinstance(kind, str):
+            self._action(kind, page, message)
         with contextlib.suppress(ValueError, InputError):
             if kind == "ghost":
                 self._show_ghost(name, message.get("joints"), page)
@@ -165,19 +176,3 @@ class Desk:
             self._tip_heights.pop(own, None)
         elif isinstance(height, int | float) and abs(height) < MAX_HEIGHT:
             self._tip_heights[own] = float(height)
-
-
-def resolutions(snapshot: Snapshot, config: Config, cycle_time: float) -> dict[str, dict[str, Any]]:
-    """Sun 2020, Section 5.1, per machine, at the rate that images really have."""
-    found = {}
-    for name, state in snapshot.machines.items():
-        speed = float(np.linalg.norm(state.pose.base_velocity))
-        if not math.isfinite(speed):
-            continue
-        now = resolution(cycle_time, speed, state.pose.joint_velocities)
-        roles = [joint.role for joint in config.machines[name].joints]
-        found[name] = {
-            "points_per_m": now.points_per_metre,
-            "points_per_rad": dict(zip(roles, now.points_per_radian.tolist(), strict=True)),
-        }
-    return found

@@ -10,9 +10,12 @@ from backend.documents.assessment import AssessmentDocument
 from backend.documents.bench import BenchDocument
 from backend.documents.conversion import ConversionDocument, ExportDocument
 from backend.documents.cspace import CspaceDocument
+from backend.documents.recordings import RecordingsDocument, RecoverDocument
+from backend.documents.session import DiffDocument, SeriesDocument, SessionDocument
 from backend.documents.state import StateDocument
 from backend.errors import InputError
 from backend.shell.app.models import HealthModel, SiteModel, SnapshotModel
+from backend.shell.app.recording import RecordingModel
 from backend.site.tables import SiteTable
 
 SCHEMAS: dict[str, tuple[type[BaseModel], str]] = {
@@ -22,9 +25,15 @@ SCHEMAS: dict[str, tuple[type[BaseModel], str]] = {
     "convert": (ConversionDocument, "what convert --json prints"),
     "export": (ExportDocument, "what export --json prints"),
     "bench": (BenchDocument, "what bench --json prints"),
+    "recordings": (RecordingsDocument, "what recordings --json prints"),
+    "recover": (RecoverDocument, "what recover --json prints"),
+    "recording": (RecordingModel, "/api/recording"),
     "snapshot": (SnapshotModel, "/api/snapshot and the Zenoh key cockpit/snapshot"),
     "site": (SiteModel, "/api/site"),
     "health": (HealthModel, "/api/health"),
+    "session": (SessionDocument, "/api/session"),
+    "series": (SeriesDocument, "/api/session/series"),
+    "diff": (DiffDocument, "what diff --json prints, and /api/session/diff"),
     "site-file": (SiteTable, "a site file, as TOML"),
 }
 

@@ -8,10 +8,12 @@ import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from backend.documents.site import site_document
 from backend.documents.snapshot import snapshot_document
+from backend.errors import InputError
 from backend.pipeline.records import Snapshot
 from backend.shell.app.app import Sources, create_app
 from backend.shell.app.feed import Frames
@@ -25,14 +27,17 @@ from backend.shell.link.session import open_session
 from backend.shell.link.source import LinkSource
 from backend.shell.runner import Runner
 from backend.site.site import Site
-from cockpit.desk import LOOPBACK, Desk, image_loops, load_models, make_config, resolutions
+from cockpit.desk import LOOPBACK, Desk, image_loops, load_models, make_config
+from cockpit.recording import make_recorder, recording_sources
+from cockpit.resolutions import resolutions
 from cockpit.views.inputs import scene_site
 from cockpit.views.server import HEAD, View, start
 
 
 @dataclass(frozen=True)
 class Options:
-    """host, port: of the page; listen, connect: Zenoh endpoints; own: machines answered for."""
+    """host, port: of the page; listen, connect: Zenoh endpoints; own: machines answered for;
+    recording: whether; record: in which folder, None for the site's own."""
 
     host: str
     port: int
@@ -40,6 +45,8 @@ class Options:
     connect: tuple[str, ...]
     own: tuple[str, ...]
     mode: str
+    record: Path | None = None
+    recording: bool = True
 
 
 class Station:
@@ -73,19 +80,22 @@ class Station:
         self.config = make_config(site, models, options.own, options.mode)
         self._demo_began = demo_began
         self.hub = Hub()
-        desk = Desk(self.config, self.hub, lambda: self.view)
         session = open_session(options.listen, options.connect, mode="router")
         self._closing.callback(session.close)
         prefixes = {machine.prefix: machine.name for machine in site.machines}
-        self.receiver = Receiver(session, prefixes)
+        self.recorder = make_recorder(site, self.config, options)
+        self._desk = Desk(self.config, self.hub, lambda: self.view, self.recorder.action)
+        self.receiver = Receiver(session, prefixes, everything=self.recorder.wants_everything)
         self._closing.callback(self.receiver.close)
         self.runner = Runner(
             self.config,
             image_loops(site, self.config, self._closing),
-            LinkSource(self.receiver),
+            LinkSource(self.receiver, self.recorder.hear),
             self.hub,
             site.rates.step_hz,
-            desk.wishes,
+            self._desk.wishes,
+            notices=self.recorder.notices,
+            after_cycle=self.recorder.after_cycle,
         )
         frames = Frames(self.hub, self.document)
         relay = Relay(session, self.hub, self._texts, frames.images)
@@ -95,8 +105,9 @@ class Station:
             site=site_document(site, self.config),
             frames=frames,
             backend=self.backend,
-            on_message=desk.on_message,
-            what_if=desk.what_if,
+            on_message=self._on_message,
+            what_if=self._desk.what_if,
+            recording=recording_sources(self.recorder, site, options),
         )
         hooks = Hooks(opened=self.view.attach, closed=self.view.detach)
         loopback = options.host in LOOPBACK
@@ -106,6 +117,8 @@ class Station:
             hosts=LOOPBACK if loopback else ("*",),
         )
         self.web = WebServer(app, listener)
+        self.recorder.start()
+        self._closing.callback(self.recorder.close)
         self.runner.start()
         self._closing.callback(self.runner.stop)
         relay.start()
@@ -128,13 +141,18 @@ class Station:
         if rate > 0.0:
             document["resolution"] = resolutions(snapshot, self.config, 1.0 / rate)
         document["backend"] = self.backend()
+        document["recording"] = vars(self.recorder.state())
         if self._demo_began is not None:
             document["demo"] = {"elapsed": time.time() - self._demo_began()}
         return document
 
     def _texts(self, snapshot: Snapshot) -> tuple[str, str]:
+        """JSON of a snapshot and of its alarms, for others and for the recording."""
         document = self.document(snapshot)
-        return dumps(document), dumps(document["alarms"])
+        text, alarms = dumps(document), dumps(document["alarms"])
+        self.recorder.snapshot(text, snapshot.time)
+        self.recorder.alarms(alarms, snapshot.time)
+        return text, alarms
 
     def backend(self) -> dict[str, Any]:
         """Live timings of both loops."""
@@ -143,3 +161,11 @@ class Station:
             **{name: vars(watch.timing()) for name, watch in self.runner.image_timing.items()},
             "failure": self.runner.failure,
         }
+
+    def _on_message(self, message: dict[str, Any]) -> None:
+        """What a page asks of the recording, or of the scene and the images."""
+        if message.get("type") == "marker":
+            with contextlib.suppress(InputError):
+                self.recorder.mark("note", str(message.get("text", "")))
+        else:
+            self._desk.on_message(message)

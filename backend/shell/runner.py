@@ -11,10 +11,11 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from typing import Protocol
 
 from backend.pipeline.config import Config
-from backend.pipeline.records import ImageStamp, Inputs
+from backend.pipeline.records import ImageStamp, Inputs, Notice, Snapshot
 from backend.pipeline.step import initial, step
 from backend.shell.hub import Hub
 from backend.shell.image_loops import ImageLoop, ImageLoops, Stopwatch, ticks
@@ -32,7 +33,9 @@ class Source(Protocol):
 class Runner:
     """Runs the pipeline in real time until stopped; every view reads the hub.
 
-    loops: what images are made, and how often; wishes: what operators chose, asked each time.
+    loops: what images are made, and how often; wishes: what operators chose, asked each time;
+    notices: what operators should know about the cockpit itself, asked each cycle; after_cycle:
+    told a cycle's inputs and conclusions once every view has them. Both must be quick.
     """
 
     def __init__(
@@ -44,6 +47,8 @@ class Runner:
         step_hz: float,
         wishes: Callable[[], Wishes] = lambda: Wishes({}),
         clock: Callable[[], float] = time.monotonic,
+        notices: Callable[[], tuple[Notice, ...]] = lambda: (),
+        after_cycle: Callable[[Inputs, Snapshot], None] = lambda inputs, snapshot: None,
     ) -> None:
         self.config = config
         self.hub = hub
@@ -51,6 +56,8 @@ class Runner:
         self._source = source
         self._step_period = 1.0 / step_hz
         self._clock = clock
+        self._notices = notices
+        self._after_cycle = after_cycle
         self._done: deque[ImageStamp] = deque(maxlen=100)
         self._images = ImageLoops(hub, loops, wishes, self._done.append, clock)
         self.image_timing = self._images.timing
@@ -87,14 +94,10 @@ class Runner:
             start = self._clock()
             inputs = self._source.take()
             finished = tuple(self._done.popleft() for _ in range(len(self._done)))
-            if finished:
-                inputs = Inputs(
-                    inputs.samples,
-                    inputs.images + finished,
-                    inputs.malformed,
-                    inputs.foreign,
-                    inputs.lost,
-                )
+            notices = self._notices()
+            if finished or notices:
+                inputs = replace(inputs, images=inputs.images + finished, notices=notices)
             state, snapshot = step(state, inputs, start, self.config)
             self.step_timing.add(start, self._clock())
             self.hub.publish(snapshot)
+            self._after_cycle(inputs, snapshot)

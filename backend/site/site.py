@@ -19,6 +19,7 @@ from backend.site.tables import (
     Obstacle,
     ObstacleMesh,
     Rates,
+    Recording,
     Safety,
     SiteMachine,
     SiteTable,
@@ -46,6 +47,7 @@ class Site:
     obstacles: tuple[Obstacle, ...]
     meshes: tuple[ObstacleMesh, ...]
     link: Link
+    recording: Recording
     can_map: Path | None = None
 
     @property
@@ -107,7 +109,7 @@ def parse_site(data: dict[str, Any], path: Path) -> Site:
         )
     except InputError as error:
         raise InputError(f"{path}: frame.{error}") from error
-    can_map = table.recordings.can_map
+    can_map = table.can.map
     return Site(
         path=path.resolve(),
         name=table.name,
@@ -121,6 +123,7 @@ def parse_site(data: dict[str, Any], path: Path) -> Site:
         obstacles=table.obstacle,
         meshes=table.obstacle_mesh,
         link=table.link,
+        recording=table.recording,
         can_map=path.resolve().parent / can_map if can_map else None,
     )
 

@@ -224,11 +224,10 @@ class ObstacleMesh(Table):
     max_excess: Annotated[float, Field(gt=0.0, le=5.0)] = 0.15
 
 
-class Recordings(Table):
-    """Other people's recordings. can_map: which CAN signal is what, a path seen from the site file
-    (see scenes/can/README.md)."""
+class Can(Table):
+    """CAN logs. map: which signal is what, a path seen from the site file (scenes/can/README.md)."""
 
-    can_map: Annotated[str, Field(min_length=1)] | None = None
+    map: Annotated[str, Field(min_length=1)] | None = None
 
 
 class Link(Table):
@@ -236,6 +235,18 @@ class Link(Table):
 
     connect: tuple[str, ...] = ()
     listen: tuple[str, ...] = ()
+
+
+class Recording(Table):
+    """What a running cockpit records. folder: of all recordings, relative to the site file; empty
+    for $EXCAVATOR_COCKPIT_RECORDINGS or ~/.local/state/excavator-cockpit/recordings. The oldest
+    parts beyond max_gib [GiB] and max_hours [h] are deleted, except those that are pinned.
+    """
+
+    enabled: bool = True
+    folder: str = ""
+    max_gib: Annotated[float, Field(ge=0.1, le=10_000.0)] = 4.0
+    max_hours: Annotated[float, Field(ge=0.1, le=10_000.0)] = 24.0
 
 
 class SiteTable(Table):
@@ -252,7 +263,8 @@ class SiteTable(Table):
     obstacle: tuple[Obstacle, ...] = ()
     obstacle_mesh: tuple[ObstacleMesh, ...] = ()
     link: Link = Link()
-    recordings: Recordings = Recordings()
+    recording: Recording = Recording()
+    can: Can = Can()
 
     @model_validator(mode="after")
     def _distinct(self) -> SiteTable:

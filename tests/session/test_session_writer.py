@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import resource
 from pathlib import Path
 
 import jsonschema
+import mcap.records
 import numpy as np
 import pytest
 from mcap.exceptions import EndOfFile
@@ -73,7 +75,7 @@ def test_chunks_are_of_64_KiB_and_indexed(tmp_path: Path) -> None:
         assert len(summary.chunk_indexes) == len(sizes)
         middle = sent[len(sent) // 2].time
         some = reader.iter_messages(
-            topics=["/left/joint_states"], start_time=middle, end_time=middle + 10**9
+            topics=["/left/joint_states"], starting_at=middle, ending_before=middle + 10**9
         )
         expected = [
             m for m in sent
@@ -136,6 +138,11 @@ def test_mistakes_are_said(tmp_path: Path) -> None:
     writer.close()
 
 
+def write_all(writer: SessionWriter, sent: list[Message]) -> None:
+    for message in sent:
+        writer.write(message)
+
+
 def test_a_failed_write_leaves_whole_records_only(tmp_path: Path) -> None:
     """A file size limit of the process stands for a full disk: the same kind of error."""
     path = tmp_path / "a.mcap"
@@ -146,17 +153,15 @@ def test_a_failed_write_leaves_whole_records_only(tmp_path: Path) -> None:
     resource.setrlimit(resource.RLIMIT_FSIZE, (limit, old[1]))
     try:
         with pytest.raises(OSError, match="File too large"):
-            for message in sent:
-                writer.write(message)
+            write_all(writer, sent)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, old)
     writer.abandon()
     assert 0 < path.stat().st_size == writer.size <= limit
-    with path.open("rb") as stream:
-        count, records = 0, StreamReader(stream, validate_crcs=True).records
-        with pytest.raises(EndOfFile):
-            while True:
-                count += type(next(records)).__name__ == "Message"
+    count = 0
+    with path.open("rb") as stream, contextlib.suppress(EndOfFile):
+        for record in StreamReader(stream, validate_crcs=True).records:
+            count += isinstance(record, mcap.records.Message)
     assert count == writer.durable + 1 > 0
 
 

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Collection, Iterator, Mapping
-from dataclasses import dataclass, fields
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import msgspec
 
 from backend.fusion.samples import ClockSample, Sample
-from backend.pipeline import records
-from backend.pipeline.records import ImageStamp, Inputs
+from backend.pipeline.records import ImageStamp, Inputs, Notice
 from backend.shell.link.codec import DecodeError, decode
 from backend.shell.link.messages import AgentStatus, Command, TrueState
 from backend.shell.link.topics import Direction, match
@@ -134,6 +133,18 @@ def portions(
         yield from _periodic(reader, messages, start, end)
 
 
+def samples(session: Session, topics: Topics, messages: Iterable[Message]) -> Iterator[Sample]:
+    """The samples in some of a session's messages; what cannot be decoded is left out."""
+    reader = _Reader(session, topics)
+    for message in messages:
+        try:
+            sample = reader.sample(message)
+        except DecodeError:
+            continue
+        if sample is not None:
+            yield sample
+
+
 class _Reader:
     """Messages to samples. fused: topic -> machine, suffix."""
 
@@ -170,7 +181,7 @@ class _Reader:
 
 
 def _recorded(reader: _Reader, messages: Iterator[Message]) -> Iterator[Portion]:
-    samples: list[Sample] = []
+    heard: list[Sample] = []
     newest = -math.inf
     for message in messages:
         if message.topic != CYCLE:
@@ -180,38 +191,31 @@ def _recorded(reader: _Reader, messages: Iterator[Message]) -> Iterator[Portion]
             except DecodeError:
                 continue
             if sample is not None:
-                samples.append(sample)
+                heard.append(sample)
             continue
         try:
             cycle = document(message.data)
             own = float(cycle["time"])
             number = int(cycle["cycle"])
-            inputs = _inputs(tuple(samples), cycle)
+            inputs = _inputs(tuple(heard), cycle)
         except (ValueError, TypeError, KeyError):
             reader.session.note("a cycle's message cannot be read; its portion joins the next")
             continue
         local = reader.local(message.time)
         newest = max(newest, own if abs(own - local) <= SET else local)
-        samples = []
+        heard = []
         yield Portion(newest, message.time, inputs, number)
 
 
-def _inputs(samples: tuple[Sample, ...], cycle: dict[str, Any]) -> Inputs:
-    more: dict[str, Any] = {}
-    if cycle.get("notices") and "notices" in _INPUTS:
-        more["notices"] = tuple(_NOTICE(**notice) for notice in cycle["notices"])
+def _inputs(heard: tuple[Sample, ...], cycle: dict[str, Any]) -> Inputs:
     return Inputs(
-        samples=samples,
+        samples=heard,
         images=tuple(ImageStamp(**image) for image in cycle.get("images", ())),
         malformed=tuple((str(key), int(n)) for key, n in cycle.get("malformed", ())),
         foreign=tuple((str(key), int(n)) for key, n in cycle.get("foreign", ())),
         lost=int(cycle.get("lost", 0)),
-        **more,
+        notices=tuple(Notice(**notice) for notice in cycle.get("notices", ())),
     )
-
-
-_INPUTS = {field.name for field in fields(Inputs)}
-_NOTICE: Any = getattr(records, "Notice", None)
 
 
 def _periodic(
@@ -222,14 +226,14 @@ def _periodic(
     first = session.begin if start is None else max(start, session.begin)
     last = session.end if end is None else min(end, session.end)
     due = session.begin + max(1, -(-(first - session.begin) // PERIOD)) * PERIOD
-    samples: list[Sample] = []
+    heard: list[Sample] = []
     malformed: dict[str, int] = {}
 
     def portion() -> Portion:
         found = Portion(
-            reader.local(due), due, Inputs(tuple(samples), malformed=tuple(malformed.items()))
+            reader.local(due), due, Inputs(tuple(heard), malformed=tuple(malformed.items()))
         )
-        samples.clear()
+        heard.clear()
         malformed.clear()
         return found
 
@@ -244,8 +248,8 @@ def _periodic(
             malformed[f"{machine}/{suffix}"] = malformed.get(f"{machine}/{suffix}", 0) + 1
             continue
         if sample is not None:
-            samples.append(sample)
-    while due <= last or samples:
+            heard.append(sample)
+    while due <= last or heard:
         yield portion()
         due += PERIOD
 

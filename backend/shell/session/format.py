@@ -71,8 +71,10 @@ SCHEMAS: dict[str, dict[str, Any]] = {
     ALARM: _object("Alarms", {"alarms": {"type": "array"}}, {}),
     # what an operator did on a page
     ACTION: _object("Action", {"action": _TEXT}, {"page": _TEXT, "details": {"type": "object"}}),
-    # kind: "note", "near miss", "pin"; text: in an operator's words
-    MARKER: _object("Marker", {"kind": _TEXT, "text": _TEXT}, {"machine": _TEXT}),
+    # kind: "note", "near miss", "pin"; text: in an operator's words; details: of a near miss
+    MARKER: _object(
+        "Marker", {"kind": _TEXT, "text": _TEXT}, {"machine": _TEXT, "details": {"type": "object"}}
+    ),
 }
 """JSON Schema of every topic of ours."""
 

@@ -1,8 +1,8 @@
 """Writing one MCAP file so that whatever was written stays readable.
 
-mcap's own writer keeps schemas and channels inside chunks, where one damaged chunk takes them along,
-and does not say how far a file is whole after a failed write. Here they stand between the chunks,
-every finished chunk goes to the operating system at once, and a failed write is cut off again.
+mcap's own writer keeps schemas and channels inside chunks, where one damaged chunk takes them
+along, and does not say how far a file is whole after a failed write. Here they stand between the
+chunks, every finished chunk goes to the operating system at once, and a failed write is cut off.
 """
 
 from __future__ import annotations
@@ -53,7 +53,8 @@ class _Open:
 class McapFile:
     """Creates a file, which must not exist. Every method raises OSError when the disk refuses.
 
-    After an OSError the file ends with the last whole record: call `abandon`.
+    After an OSError the file ends with the last whole record. Then `drop_chunk` and `close` finish
+    it as soon as the disk allows it, or `abandon` leaves it without a summary.
     """
 
     def __init__(self, path: Path, profile: str, library: str) -> None:
@@ -85,10 +86,11 @@ class McapFile:
 
     def schema(self, name: str, encoding: str, data: bytes) -> int:
         """The new schema's id."""
-        schema = Schema(id=len(self._schemas) + 1, name=name, encoding=encoding, data=data)
+        number = len(self._schemas) + 1
+        schema = Schema(id=number, name=name, encoding=encoding, data=data)
         self._put(_record(schema))
         self._schemas.append(schema)
-        return schema.id
+        return number
 
     def channel(self, topic: str, encoding: str, schema: int) -> int:
         """The new channel's id. schema: 0 for none."""
@@ -150,6 +152,10 @@ class McapFile:
         self.end = max(self.end, chunk.end)
         for channel, entries in chunk.entries.items():
             self.counts[channel] = self.counts.get(channel, 0) + len(entries)
+        self._open = _Open()
+
+    def drop_chunk(self) -> None:
+        """Forgets the messages in the chunk being filled."""
         self._open = _Open()
 
     def close(self) -> None:

@@ -6,25 +6,22 @@
 
 from __future__ import annotations
 
-import re
 from bisect import bisect_left
-from collections import Counter
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, field
 from itertools import groupby, islice
 from pathlib import Path
-from typing import IO
 
 from backend.errors import InputError
 from backend.shell.session import format as our_format
 from backend.shell.session.chunks import (
-    ALLOWED,
     MAGIC,
     Damaged,
     File,
     check_magic,
     summary,
 )
+from backend.shell.session.files import Streams, missing, paths_of, shared
 from backend.shell.session.format import Header, Message
 from backend.shell.session.timeline import JUMP, Record, Stretch, Timeline, in_order
 from backend.shell.session.walk import walk
@@ -114,7 +111,7 @@ class Session:
             {k for k, (topic, _, _) in file.topics.items() if topics is None or topic in topics}
             for file in self._files
         ]
-        with _Streams(self._files) as streams:
+        with Streams(self._files) as streams:
 
             def read(stretch: Stretch) -> list[Record]:
                 try:
@@ -157,33 +154,28 @@ class Session:
                 continue
             yield stretch
 
+    def last_before(self, time: int, topic: str) -> int | None:
+        """When the newest message of a topic before `time` came [ns]; chunks without it are not
+        read.
+        """
+        line = self._timeline
+        wanted = [{k for k, (name, *_) in f.topics.items() if name == topic} for f in self._files]
+        last = bisect_left(line.reached, time)
+        for stretch in reversed(line.stretches[: last + 1]):
+            channels = stretch.chunk.channels
+            if channels is not None and not channels & wanted[stretch.file]:
+                continue
+            found = [
+                m.time for m in self.messages(stretch.start, min(stretch.end, time - 1), [topic])
+            ]
+            if found:
+                return max(found)
+        return None
+
     def _skipped(self, stretch: Stretch, why: str) -> None:
         name = self._files[stretch.file].path.name
         at, span = (stretch.start - self.begin) / 1e9, (stretch.end - stretch.start) / 1e9
         self.note(f"{name}: {span:.1f} s at {at:.1f} s are damaged and left out ({why})")
-
-
-class _Streams:
-    """The file that is read, opened when its turn comes."""
-
-    def __init__(self, files: list[File]) -> None:
-        self._files = files
-        self._opened: tuple[int, IO[bytes]] | None = None
-
-    def __enter__(self) -> _Streams:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        if self._opened is not None:
-            self._opened[1].close()
-
-    def messages(self, stretch: Stretch) -> list[Record]:
-        """Raises Damaged and OSError."""
-        if self._opened is None or self._opened[0] != stretch.file:
-            self.__exit__()
-            self._opened = None
-            self._opened = stretch.file, self._files[stretch.file].path.open("rb")
-        return self._files[stretch.file].messages(self._opened[1], stretch.chunk)
 
 
 def open_session(path: Path, progress: Progress | None = None) -> Session:
@@ -192,7 +184,7 @@ def open_session(path: Path, progress: Progress | None = None) -> Session:
     Raises InputError where nothing can be read; what is wrong with a part becomes a note.
     """
     tell = progress or (lambda _: None)
-    paths = _paths(path)
+    paths = paths_of(path)
     files: list[File] = []
     headers: list[Header | None] = []
     notes: list[str] = []
@@ -220,23 +212,6 @@ def open_session(path: Path, progress: Progress | None = None) -> Session:
     order = sorted(range(len(files)), key=lambda k: _place(headers[k], k))
     files, headers = [files[k] for k in order], [headers[k] for k in order]
     return _joined(path, files, headers, notes)
-
-
-def _paths(path: Path) -> list[Path]:
-    if path.is_file():
-        return [path]
-    if not path.is_dir():
-        raise InputError(f"{path}: there is no such file or folder; {ALLOWED}.")
-    found = sorted(path.glob("*.mcap"), key=_natural)
-    if not found:
-        raise InputError(f"{path}: holds no .mcap file; {ALLOWED}.")
-    return found
-
-
-def _natural(path: Path) -> list[tuple[int, str]]:
-    """part-2 before part-10."""
-    pieces = re.split(r"(\d+)", path.name)
-    return [(int(piece), "") if piece.isdigit() else (-1, piece) for piece in pieces]
 
 
 def _place(header: Header | None, k: int) -> tuple[int, int]:
@@ -280,34 +255,8 @@ def _joined(
         end=max(part.end for part in parts),
         _files=files,
         _timeline=line,
-        _notes=[*notes, *line.notes, *_missing(headers), *_shared(files)][:MOST_NOTES],
+        _notes=[*notes, *line.notes, *missing(headers), *shared(files)][:MOST_NOTES],
     )
-
-
-def _missing(headers: list[Header | None]) -> list[str]:
-    """Parts that are not there, and parts of other recordings."""
-    numbers = [header.part for header in headers if header is not None]
-    names = {header.recording for header in headers if header is not None}
-    found = []
-    if numbers and len(numbers) > 1:
-        absent = sorted(set(range(numbers[0], numbers[-1] + 1)) - set(numbers))
-        if absent:
-            found.append(f"parts {', '.join(map(str, absent))} are missing")
-    if len(names) > 1:
-        found.append(f"parts of {len(names)} recordings stand in one folder")
-    return found
-
-
-def _shared(files: list[File]) -> list[str]:
-    """Topics that several senders published on: two machines may go by one name."""
-    found = set()
-    for file in files:
-        names = Counter(topic for topic, _, _ in file.topics.values())
-        found |= {topic for topic, senders in names.items() if senders > 1}
-    return [
-        f"{topic}: several senders shared this topic; are there two machines with one name?"
-        for topic in sorted(found)
-    ]
 
 
 def _topics(files: list[File]) -> dict[str, TopicInfo]:

@@ -24,7 +24,8 @@ CDR, JSON = "cdr", "json"
 
 
 class SessionWriter:
-    """Creates one MCAP file. Writes raise OSError when the disk refuses; then call `abandon`.
+    """Creates one MCAP file. Writes raise OSError when the disk refuses: then call `abandon`, or
+    `drop_chunk` and, once there is room again, `close`.
 
     Raises InputError when the file cannot be created. Chunks close by themselves when they are
     full; `flush_chunk` closes one that is not.
@@ -79,6 +80,11 @@ class SessionWriter:
         """Finish the file with its summary. Calling again is harmless."""
         self._file.close()
         self.durable = self._last
+
+    def drop_chunk(self) -> None:
+        """Forget what was not flushed. After a failed write, `close` may then be tried again."""
+        self._file.drop_chunk()
+        self._last = self.durable
 
     def abandon(self) -> None:
         """Close the file as it is, after a failed write; what was flushed stays readable."""
