@@ -138,8 +138,17 @@ class Message:
 
 
 def stamp(time: float, offset: int) -> int:
-    """[ns since 1970] of `time` [s] on the monotonic clock."""
-    return round(time * 1e9) + offset
+    """[ns since 1970] of `time` [s] on the monotonic clock.
+
+    After weeks that clock's float is coarser than a nanosecond, and the product is rounded once
+    more: the nearest neighbour that gives `time` again is taken.
+    """
+    near = round(time * 1e9)
+    for away in range(17):
+        for count in (near + away, near - away):
+            if count / 1e9 == time:
+                return count + offset
+    return near + offset
 
 
 def seconds(log_time: int, offset: int) -> float:
