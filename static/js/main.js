@@ -142,7 +142,7 @@ function onFrame(header, arrays) {
     // After a jump an image can be right again that was of another time.
     if (partner !== state.partner || (replaying() && before?.time !== header.time)) for (const s of images) s.dirty = true;
   } else if (header.type === "exact" ? header.own === state.own : header.key === `${state.own}<-${state.partner}`) {
-    for (const s of images) s.dirty = true;
+    for (const s of replaying() ? [...images, plots.bars, plots.plan] : images) s.dirty = true;
   }
 }
 
@@ -201,6 +201,7 @@ window.cockpit = Object.freeze({
   get state() { return state; },
   get latency() { return { arrival: quantiles(latency.arrival), drawn: quantiles(latency.drawn) }; },
   get link() { return link(); },
+  get ages() { return { snapshot: snapshotAge() }; },
   get rejected() { return socket.rejected(); },
   get paint() { return Object.fromEntries([...PERIOD.keys()].map((s) => [s.canvas.id, Math.round(s.cost * 100) / 100])); },
 });

@@ -50,10 +50,12 @@ async function askDocument() {
 async function askDiff() {
   try {
     session.diff = await get("/api/session/diff");
-    session.diffProblem = session.diff.state === "failed" ? session.diff.error ?? "the comparison failed" : "";
+    // Why it could not be started stays to be read while none runs.
+    if (session.diff.state === "failed") session.diffProblem = session.diff.error ?? "it failed";
+    else if (session.diff.state !== "none") session.diffProblem = "";
     return session.diff.state === "running" ? BUSY : never;
   } catch (error) {
-    session.diffProblem = session.diff.state === "running" ? error.message : "";
+    if (session.diff.state === "running") session.diffProblem = error.message;
     return session.diff.state === "running" ? RETRY : never;
   }
 }
@@ -63,11 +65,11 @@ export async function startDiff() {
   session.diff = { state: "running", progress: 0, result: null };
   try {
     await post("/api/session/diff");
+    hurry("diff");
   } catch (error) {
     session.diff = { state: "none", progress: 0, result: null };
     session.diffProblem = error.message;
   }
-  hurry("diff");
 }
 
 /** [start, end] of what the series show; pages along when the cursor leaves it. */

@@ -6,7 +6,7 @@ import { clock, day, wallClock } from "./clock.js";
 import { replaying } from "./state.js";
 import * as player from "./player.js";
 import * as sheets from "./sheets.js";
-import { note, problems, session } from "./session.js";
+import { problems, session } from "./session.js";
 import { busyText, failure, startReport } from "./report.js";
 import { widest } from "./headers.js";
 
@@ -44,7 +44,6 @@ function news() {
   if (session.problem) return ["error", [session.problem]];
   if (player.playback().catching_up) return ["busy", ["catching up: slower than asked", "catching up"]];
   if (building) return ["busy", [building]];
-  if (note()) return ["note", [note(), "note: see Session"]];
   return ["", [""]];
 }
 

@@ -75,6 +75,7 @@ function paint(g, width, height, dpr) {
   const zones = exact ? drawZones(g, exact, dpr, stale) : null;
   if (!exact) drawZone(g, zone, dpr, stale ? C.stale : C.partner);
   else if (how === "difference") outlineSun(g, zone);
+  if (replaying()) playbackMark(g, box);
   for (const name of names()) circles(g, name);
   obstacles(g);
   for (const name of names()) if (name !== state.own) outlines(g, name);
@@ -85,7 +86,6 @@ function paint(g, width, height, dpr) {
   for (const name of names()) base(g, name);
   north(g, turn);
   if (exact) zoneNote(g, exact, stale);
-  if (replaying()) playbackMark(g, box);
   g.restore();
   if (!view.tracksUp) gridText(g, grid, height, t);
   const age = Math.max(snapshotAge(), entry ? imageAge(entry) : 0);

@@ -70,7 +70,7 @@ export function paint(g, width, height, dpr) {
   const t = size("tick");
   const map = scale(0, Math.max(p.duration, 0.001), 12, width - 12);
   Object.assign(geometry, { map, height });
-  const top = Math.round(1.15 * t), bottom = height - 5;
+  const top = Math.round(t) + 2, bottom = height - 4;
   g.fillStyle = C.free;
   g.fillRect(map(0), top, map(p.duration) - map(0), bottom - top);
   ruler(g, map, top, p.duration);
@@ -80,7 +80,7 @@ export function paint(g, width, height, dpr) {
   const part = loop();
   if (part) section(g, part, map, top, bottom);
   // Of marks that would cover each other, the gravest.
-  const r = Math.min(0.45 * (bottom - top), 0.62 * t);
+  const r = Math.min(0.55 * (bottom - top), 0.65 * t);
   const places = new Map();
   for (const e of shown) places.set(Math.round(map(e.start) / (0.9 * r)), e);
   for (const e of [...places.values()].sort((a, b) => rank(a) - rank(b))) mark(g, e, map(e.start) + 1, (top + bottom) / 2, r);
