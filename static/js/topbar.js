@@ -61,7 +61,7 @@ export function update() {
   if (state.site) {
     write($("site-title"), state.site.title ?? state.site.name);
     const epsg = state.site.frame?.epsg ? `EPSG:${state.site.frame.epsg}` : "";
-    write($("site-name"), [state.site.name, epsg].filter(Boolean).join(" · "));
+    write($("site-name"), state.snapshot?.playback?.title || [state.site.name, epsg].filter(Boolean).join(" · "));
   }
   if (!s) return;
   const mode = modeOf();

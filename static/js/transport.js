@@ -11,7 +11,7 @@ import { busyText, failure, startReport } from "./report.js";
 import { widest } from "./headers.js";
 
 const PLAY = "M3 1v14l11-7z", PAUSE = "M3 1h4v14H3zM9 1h4v14H9z";
-let status;
+let status, time, wallTime;
 
 export function startTransport() {
   const on = (id, act) => $(id).addEventListener("click", act);
@@ -28,6 +28,8 @@ export function startTransport() {
   on("t-report", startReport);
   for (const name of ["compare", "export", "session"]) on(`t-${name}`, () => sheets.toggle(name));
   status = slowText($("t-status"));
+  time = slowText($("t-time"));
+  wallTime = slowText($("t-wall"));
   // After a click the keys belong to the player again: Space must not press the button once more.
   document.addEventListener("click", (event) => {
     if (replaying() && event.detail > 0) event.target.closest?.("button")?.blur();
@@ -68,11 +70,14 @@ export function update() {
   canvas.setAttribute("aria-valuemax", p.duration.toFixed(1));
   canvas.setAttribute("aria-valuenow", at.toFixed(1));
   canvas.setAttribute("aria-valuetext", clock(at));
-  write($("t-time"), clock(at));
-  $("t-time").style.minWidth = `${clock(p.duration).length * 0.54}em`;
-  mark($("t-time"), "seeking", player.seeking() ? 1 : 0);
-  write($("t-duration"), ` / ${clock(p.duration)}`);
-  write($("t-wall"), wallClock(p.wall - p.time + at));
+  // Standing still, every cycle counts; playing, digits change twice a second at most.
+  const seeking = player.seeking();
+  const still = seeking || !playing;
+  time(`${seeking ? "→ " : ""}${clock(at, still ? 2 : 0)}`, still ? at : "playing");
+  $("t-time").style.minWidth = `${0.56 * clock(p.duration, 2).length + 1.3}em`;
+  mark($("t-time"), "seeking", seeking ? 1 : 0);
+  write($("t-duration"), ` / ${clock(p.duration, 0)}`);
+  wallTime(wallClock(p.wall - p.time + at), still ? at : "playing");
   $("t-wall").title = `Clock on the wall of what is shown: ${day(p.wall)}`;
   mark($("t-play"), "playing", playing ? 1 : 0);
   const path = $("t-play").querySelector("path");

@@ -167,6 +167,16 @@ def test_playback_fits_and_says_so(
     assert "paused" in feed.page.inner_text("#watermark-what")
     whole(feed, size)
     feed.page.screenshot(path=artifacts / f"{where}-stop.png")
+    feed.page.click("#t-session")
+    feed.page.keyboard.press("?")
+    feed.send(lambda: feed.page.is_hidden("#sheet-session") and feed.page.is_visible("#help"))
+    assert feed.page.is_visible("#help-playback")
+    if not low:
+        assert feed.page.evaluate(OUTSIDE) == []
+        assert feed.page.evaluate("document.getElementById('help').scrollHeight") <= (
+            feed.page.evaluate("document.getElementById('help').clientHeight")
+        )
+    feed.page.screenshot(path=artifacts / f"{where}-help.png")
     assert feed.errors == []
     feed.page.close()
 
@@ -176,7 +186,7 @@ def test_dragging_the_timeline_seeks_and_shows_the_target(feed: PlaybackFeed) ->
     begun = time.monotonic()
     feed.drag(200, 500, steps=50)
     feed.wait(lambda: feed.track()["dragging"])
-    feed.wait(lambda: feed.page.inner_text("#t-time").startswith(("8:19", "8:20")))
+    feed.wait(lambda: feed.page.inner_text("#t-time").startswith(("→ 8:19", "→ 8:20")))
     assert feed.page.inner_text("#hover").startswith(("8:19", "8:20"))
     seeks = feed.said("seek")
     assert 1 <= len(seeks) <= 10 * (time.monotonic() - begun) + 2  # not one for every pixel
@@ -354,7 +364,7 @@ def test_comparing_shows_progress_then_a_table_that_jumps(
     feed.send(lambda: "Levels agree 99.8 %" in sheet.inner_text())
     assert ("POST", "/diff") in feed.player.asked
     text = sheet.inner_text()
-    for words in ("LEFT ↔ RIGHT", "0.04 m", "4:06.3", "1.4 s earlier", "never", "1 stretch"):
+    for words in ("LEFT ↔ RIGHT", "42 mm", "4:06.3", "1.4 s earlier", "never", "1 stretch"):
         assert words in text, words
     feed.send(lambda: feed.shown("trends")["sources"] == ["recorded", "evaluated"])
     feed.page.screenshot(path=artifacts / "playback-compare-1920x1080.png")

@@ -82,6 +82,12 @@ const SHAPES = {
 };
 
 export function mark(g, e, x, y, r) {
+  if (e.level === "UNKNOWN" && e.kind === "alarm") {
+    g.beginPath();
+    g.arc(x, y, r + 1, 0, 2 * Math.PI);
+    g.fillStyle = C.panel; // its own dashes must not mix with the interval's
+    g.fill();
+  }
   if (e.kind === "alarm") levelMark(g, e.level, x, y, r);
   else (SHAPES[e.kind] ?? SHAPES.action)(g, x, y, r);
 }

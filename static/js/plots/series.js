@@ -47,7 +47,7 @@ function runs(times, values) {
 function levels(g, { box, x }, data, y, h) {
   for (const [level, from, to] of runs(data.time, data.levels?.[state.own] ?? [])) {
     if (!LEVEL_COLOUR[level]) continue;
-    const x0 = Math.max(box.left, x(from)), w = Math.max(2, Math.min(box.right, x(to)) - x0);
+    const x0 = Math.max(box.left, x(from)), w = Math.max(3, Math.min(box.right, x(to)) - x0);
     if (level === "UNKNOWN") {
       g.setLineDash([3, 2]);
       g.lineWidth = 1.5;
@@ -139,7 +139,7 @@ export function paint(g, width, height) {
   const entries = choice.angles ? drawAngles(g, right, drawn[0]) : drawAges(g, right, drawn[0]);
   drawClearance(g, left, drawn);
   title(g, left, [`clearance to ${nameOf(state.partner)}, m`, "clearance, m"], drawn.map(([source]) => [swatches.line(source === "recorded" ? C.text : C.playback, DASH[source]), WORD[source]]));
-  title(g, right, choice.angles ? [`angles of ${nameOf(state.own)}, °`, "angles, °"] : ["joint age, s"], entries);
+  title(g, right, choice.angles ? [`angles of ${nameOf(state.own)}, °`, "angles, °", "°"] : ["joint age, s"], entries);
   for (const chart of charts = [left, right]) needle(g, chart);
   const first = drawn[0][1];
   return {
