@@ -173,6 +173,10 @@ def test_playback_fits_and_says_so(
     assert feed.page.is_visible("#help-playback")
     if not low:
         assert feed.page.evaluate(OUTSIDE) == []
+        panel, line = (feed.page.locator(name).bounding_box() for name in ("#help", "#alarm"))
+        assert panel is not None
+        assert line is not None
+        assert panel["y"] + panel["height"] <= line["y"]  # the alarm line stays in sight
         assert feed.page.evaluate("document.getElementById('help').scrollHeight") <= (
             feed.page.evaluate("document.getElementById('help').clientHeight")
         )
