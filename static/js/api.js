@@ -33,7 +33,11 @@ async function json(reply) {
 }
 
 export const get = async (path) => json(await request(path, {}));
-export const post = async (path, body) => json(await request(path, posting(body)));
+/** The answer, or null when there is nothing to say. */
+export async function post(path, body) {
+  const reply = await request(path, posting(body));
+  return reply.status === 204 ? null : json(reply);
+}
 
 /** Posts, and saves the answer as a file; `progress(bytes)` meanwhile. Returns the file's name. */
 export async function download(path, fallback, progress) {

@@ -43,7 +43,7 @@ function result({ distance, levels, first_warnings: warnings }) {
   const agree = levels?.agree;
   return [
     make("h4", { text: "Distances" }),
-    ...(pairs.length ? table(["machines", "largest difference", "at", "rms"], pairs.map(([key, d]) => [pairText(key), small(d.max_abs), timeButton(d.at), small(d.rms)])) : [make("p", { text: "No distance to compare." })]),
+    ...(pairs.length ? table(["machines", "largest difference", "at", "rms"], pairs.map(([key, d]) => [pairText(key), small(d.max_abs), Number.isFinite(d.at) ? timeButton(d.at) : "–", small(d.rms)])) : [make("p", { text: "No distance to compare." })]),
     // Never "100 %" while something differs.
     make("h4", { text: `Levels agree ${Number.isFinite(agree) ? `${number(Math.floor(1000 * agree + 1e-6) / 10, 1)} % of the time` : "–"}${spans.length ? `, ${spans.length} stretch${spans.length === 1 ? "" : "es"} differ${spans.length === 1 ? "s" : ""}` : ""}` }),
     ...(spans.length ? table(["machine", "from", "for", "as it was", "judged now"], spans.map((d) => [nameOf(d.machine), timeButton(d.start), `${number(d.end - d.start, 1)} s`, level(d.recorded), level(d.evaluated)])) : []),

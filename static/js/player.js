@@ -84,14 +84,8 @@ export const jump = (by) => seek(cursor() + by);
 export const toEnd = () => seek(playback()?.duration);
 
 export function toggle() {
-  const p = playback();
-  if (!p) return;
+  if (!playback()) return;
   const playing = !current("playing");
-  if (playing && !current("loop") && cursor() >= p.duration - 0.02) {
-    seek(0); // from the end there is nothing to play
-    clearTimeout(timer);
-    flush();
-  }
   ask("playing", playing);
   tell(playing ? "play" : "pause");
 }

@@ -51,7 +51,7 @@ async function askDiff() {
   try {
     session.diff = await get("/api/session/diff");
     // Why it could not be started stays to be read while none runs.
-    if (session.diff.state === "failed") session.diffProblem = session.diff.error ?? "it failed";
+    if (session.diff.state === "failed") session.diffProblem = session.diff.error || "it failed";
     else if (session.diff.state !== "none") session.diffProblem = "";
     return session.diff.state === "running" ? BUSY : never;
   } catch (error) {

@@ -52,7 +52,7 @@ function sessionSheet() {
     ["Files", d?.parts ? String(d.parts.length) : ""],
     ["Messages", d?.topics ? `${number(Object.values(d.topics).reduce((sum, t) => sum + (t.count ?? 0), 0), 0)} on ${Object.keys(d.topics).length} topics` : ""],
     ["Events", d?.events ? String(d.events.length) : ""],
-    ["Index", d?.index?.state === "building" ? `${number(100 * d.index.progress, 0)} %: events and curves are not complete yet` : ""],
+    ["Index", d?.index?.state === "failed" ? "failed: events and curves are not complete" : d?.index?.state === "building" ? `${number(100 * d.index.progress, 0)} %: events and curves are not complete yet` : ""],
   ].filter(([, text]) => text);
   const bad = problems();
   return [

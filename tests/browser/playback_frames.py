@@ -36,7 +36,7 @@ EVENTS = [
     event("near miss", "LEFT bucket ↔ RIGHT boom 0.08 m", 246.0),
     event("pin", "last 10 minutes kept", 300.0),
     event("action", "silenced", 305.0),
-    event("gap", "recorder restarted", 380.0, 402.0),
+    event("gap", "nothing was recorded for 22.0 s", 380.0, 402.0),
     event("alarm", "RIGHT position is 0.6 s old", 450.0, 470.0, "UNKNOWN"),
 ]
 

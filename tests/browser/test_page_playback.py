@@ -299,7 +299,7 @@ def test_events_are_marked_and_named(feed: PlaybackFeed) -> None:
         (45, "note: bucket teeth changed"),
         (124, "SLOW · LEFT bucket"),
         (247, "NEAR MISS"),
-        (390, "nothing recorded"),
+        (390, "nothing was recorded"),
         (460, "UNKNOWN"),
     ):
         feed.page.mouse.move(*feed.x_of(at))

@@ -37,7 +37,8 @@ def answer(feed: Feed, path: str, document: dict[str, Any], status: int = 200) -
 
     def reply(route: Route) -> None:
         asked.append(json.loads(route.request.post_data or "null"))
-        route.fulfill(status=status, body=json.dumps(document), content_type="application/json")
+        body = "" if status == 204 else json.dumps(document)
+        route.fulfill(status=status, body=body, content_type="application/json")
 
     feed.page.route(f"**/api/recording{path}", reply)
     return asked
@@ -77,7 +78,7 @@ def test_the_recorder_s_state_is_told_in_words(
 
 
 def test_a_note_by_key_and_the_last_minutes_kept(feed: Feed) -> None:
-    noted = answer(feed, "/marker", {})
+    noted = answer(feed, "/marker", {}, status=204)
     pinned = answer(feed, "/pin", {"folder": "pinned/2026-11-25"})
     answer(feed, "", {})
     feed.send(lambda: feed.page.is_visible("#rec"), recording=ON)

@@ -107,12 +107,12 @@ export function paint(g, width, height, dpr) {
   };
 }
 
-const KIND = { alarm: "", note: "note: ", "near miss": "NEAR MISS: ", pin: "pinned: ", action: "operator: ", gap: "nothing recorded: " };
+const KIND = { alarm: "", note: "note: ", "near miss": "NEAR MISS: ", pin: "pinned: ", action: "operator: ", gap: "" };
 
 function sentence(e) {
   const who = e.machine && !String(e.text).toUpperCase().includes(nameOf(e.machine)) ? `${nameOf(e.machine)} ` : "";
   const level = e.level && !String(e.text).startsWith(e.level) ? `${e.level} · ` : "";
-  const length = e.end === null || e.end === undefined ? "" : `, ${number(e.end - e.start, 1)} s`;
+  const length = e.kind === "gap" || e.end === null || e.end === undefined ? "" : `, ${number(e.end - e.start, 1)} s`;
   return `${clock(e.start)}  ${KIND[e.kind] ?? `${e.kind}: `}${level}${who}${e.text}${length}`;
 }
 
