@@ -95,6 +95,33 @@ def _decide(
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def turned_touches(
+    own: tuple[Array, Array, Array],
+    others: tuple[Array, Array, Array],
+    pairs: BoolArray,
+    radius: Array,
+    angle: float,
+    half_cell: float,
+    kind: int,
+) -> bool:
+    """`touching_swings` at one angle. radius: (own,) of the bodies about the axis [m]."""
+    if kind != 0:
+        return bool(_decide(own, others, pairs, radius, angle, half_cell, kind < 0, DEPTH))
+    cos, sin = math.cos(angle), math.sin(angle)
+    for i in range(len(own[0])):
+        for j in range(len(others[0])):
+            if not pairs[i, j]:
+                continue
+            g = _turned_gap(
+                own[0][i], own[1][i], own[2][i], others[0][j], others[1][j], others[2][j],
+                cos, sin, 0.0,
+            )  # fmt: skip
+            if g <= 0.0:
+                return True
+    return False
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _states(
     own: tuple[Array, Array, Array],
     others: tuple[Array, Array, Array],
@@ -103,22 +130,10 @@ def _states(
     angles: Array,
     half_cell: float,
     kind: int,
-    depth: int,
 ) -> BoolArray:
     out = np.zeros(len(angles), np.bool_)
     for s in range(len(angles)):
-        if kind != 0:
-            out[s] = _decide(own, others, pairs, radius, angles[s], half_cell, kind < 0, depth)
-            continue
-        cos, sin = math.cos(angles[s]), math.sin(angles[s])
-        for i in range(len(own[0])):
-            for j in range(len(others[0])):
-                if pairs[i, j] and not out[s]:
-                    g = _turned_gap(
-                        own[0][i], own[1][i], own[2][i], others[0][j], others[1][j], others[2][j],
-                        cos, sin, 0.0,
-                    )  # fmt: skip
-                    out[s] = g <= 0.0
+        out[s] = turned_touches(own, others, pairs, radius, angles[s], half_cell, kind)
     return out
 
 
@@ -146,6 +161,5 @@ def touching_swings(
         np.ascontiguousarray(angles, dtype=float),
         float(half_cell),
         kind,
-        DEPTH,
     )
     return np.asarray(found, dtype=bool)
