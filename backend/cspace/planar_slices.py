@@ -212,6 +212,8 @@ def inner_slice(
     narrowed by cos 2s, and its x is x cos s / cos d + m (t - u) with 0 <= m <= sin(s) / 2. So a
     point with such neighbours to the left and to the right is, by convexity, in all slices.
     """
+    if spread >= 0.25 * math.pi:
+        return 0
     narrow = math.cos(2.0 * spread)
     lowest, highest = max(low, low / narrow), min(high, high / narrow)
     planes = np.array([[0.0, 1.0, highest], [0.0, -1.0, -lowest]])
