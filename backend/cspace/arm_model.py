@@ -60,9 +60,9 @@ def arm_model(machine: Machine, rest: Array | None = None, inflation: float = 0.
         np.stack([arm.pivot, arm.boom, arm.stick]),
         arm.pivots,
         links + far,
-        arm.boxes.centers,
-        arm.boxes.rotations,
-        arm.boxes.half_extents,
+        arm.boxes.centers.copy(),
+        arm.boxes.rotations.copy(),
+        arm.boxes.half_extents.copy(),
         ~arm.aligned,
     )
     tracks, upper = (as_built.take(part == k).inflated(inflation).moved(T_arm_root) for k in (0, 1))
@@ -81,7 +81,7 @@ def arm_model(machine: Machine, rest: Array | None = None, inflation: float = 0.
 def _standing(boxes: Boxes) -> Standing:
     corners = boxes.corners()
     radius = np.hypot(corners[:, :, 0], corners[:, :, 1]).max(axis=1, initial=0.0)
-    return Standing(boxes.centers, boxes.rotations, boxes.half_extents, radius)
+    return Standing(boxes.centers.copy(), boxes.rotations.copy(), boxes.half_extents.copy(), radius)
 
 
 def _itself(arm: PlanarArm, as_built: Boxes, part: IntArray, self_pairs: BoolArray) -> Itself:
@@ -93,9 +93,9 @@ def _itself(arm: PlanarArm, as_built: Boxes, part: IntArray, self_pairs: BoolArr
     return Itself(
         np.array([held for held, _, _ in parts], dtype=np.int64),
         first.astype(np.int64),
-        boxes.centers,
-        boxes.rotations,
-        boxes.half_extents,
+        boxes.centers.copy(),
+        boxes.rotations.copy(),
+        boxes.half_extents.copy(),
         np.concatenate(pairs, axis=1),
     )
 

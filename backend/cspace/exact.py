@@ -92,15 +92,14 @@ def blocked(
     certified to be blocked. The whole machine counts: where the tracks touch, all is blocked,
     unless they are `standing` on the obstacles. out: an earlier image, to be written over.
     """
+    fresh = out is None
     if out is None:
         out = np.zeros((*grid.shape[:3], grid.words), dtype=np.uint64)
-        fresh = True
-    else:
-        fresh = False
     if not len(obstacles):
         out[...] = 0
         return out
-    boxes = (obstacles.centers, obstacles.rotations, obstacles.half_extents)
+    # Copies can be written to: what cannot is another type to the compiler.
+    boxes = (obstacles.centers.copy(), obstacles.rotations.copy(), obstacles.half_extents.copy())
     axes = _axes(model, grid, kind, None)
     rows = out.reshape(grid.shape[0], -1, grid.words)
 

@@ -1,4 +1,4 @@
-"""Whole images, compiled: one call for all swings against obstacles, one against the machine itself.
+"""Whole images, compiled: of all swings against obstacles, and against the machine itself.
 
 Without the GIL, so that threads can share the swings: each takes every so many, since swings side
 by side cost about the same.
@@ -21,8 +21,8 @@ from backend.spatial.types import AnyArray, Array, BoolArray, IntArray
 
 
 class Standing(NamedTuple):
-    """Bodies that do not move with the arm, in the frame `arm` at swing 0: centers (n, 3), rotations
-    (n, 3, 3), halves (n, 3), radius (n,) about the swing axis [m].
+    """Bodies that do not move with the arm, in the frame `arm` at swing 0: centers (n, 3),
+    rotations (n, 3, 3), halves (n, 3), radius (n,) about the swing axis [m].
     """
 
     centers: Array
@@ -66,7 +66,9 @@ def _touches(
     half: float,
     kind: int,
 ) -> bool:
-    pairs = np.ones((len(bodies.centers), len(others[0])), np.bool_)
+    pairs, m = np.empty((len(bodies.centers) * len(others[0]), 2), np.int64), len(others[0])
+    for k in range(len(pairs)):
+        pairs[k, 0], pairs[k, 1] = k // m, k % m
     own = (bodies.centers, bodies.rotations, bodies.halves)
     return bool(turned_touches(own, others, pairs, bodies.radius, angle, half, kind))
 
@@ -86,8 +88,8 @@ def image_kernel(
     every: int,
     out: AnyArray,
 ) -> None:
-    """Fill the swings first, first + every, ... of out (swing, boom * stick, words) with the blocked
-    cells. fresh: out is all 0.
+    """Fill the swings first, first + every, ... of out (swing, boom * stick, words) with the
+    blocked cells. fresh: out is all 0.
 
     boxes: obstacles in the root frame, centers (m, 3), rotations (m, 3, 3), halves (m, 3); axes:
     (4, 4) see exact_levels; standing: the tracks stand on the obstacles, which does not count.

@@ -24,9 +24,9 @@ from backend.spatial.types import AnyArray, Array, BoolArray
 
 
 class Chain(NamedTuple):
-    """T_arm_root: (3, 4) at swing 0; links: (3, 2) the boom's pivot, and from pivot to pivot at joint
-    values 0; pivots: (3, 2) of boom, stick and bucket there; reach: (3,) of their bodies from the
-    boom's pivot [m]. Boxes of the bodies in the frame `arm` at joint values 0, for those whose
+    """T_arm_root: (3, 4) at swing 0; links: (3, 2) the boom's pivot, and from pivot to pivot at
+    joint values 0; pivots: (3, 2) of boom, stick and bucket there; reach: (3,) of their bodies from
+    the boom's pivot [m]. Boxes of the bodies in the frame `arm` at joint values 0, for those whose
     prism is not exact: centers (n, 3), rotations (n, 3, 3), halves (n, 3), askew (n,).
     """
 

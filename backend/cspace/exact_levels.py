@@ -72,10 +72,18 @@ def levels(links: Array, axes: Array, kind: int) -> tuple[Level, Level, Level]:
     ox, oz = links[0, 0], links[0, 1]
     l1, l2 = math.hypot(links[1, 0], links[1, 1]), math.hypot(links[2, 0], links[2, 1])
     rows = n1 * n2
-    x0, z0, origin0, margin0 = np.full(1, ox), np.full(1, oz), np.full(1, axes[1, START]), np.empty(1)
+    x0, z0, origin0, margin0 = (
+        np.full(1, ox),
+        np.full(1, oz),
+        np.full(1, axes[1, START]),
+        np.empty(1),
+    )
     x1, z1, origin1, margin1 = np.empty(n1), np.empty(n1), np.empty(n1), np.empty(n1)
     x2, z2, origin2, margin2 = np.empty(rows), np.empty(rows), np.empty(rows), np.empty(rows)
-    lever_x, lever_z = np.empty(rows if kind != EXACT else 0), np.empty(rows if kind != EXACT else 0)
+    lever_x, lever_z = (
+        np.empty(rows if kind != EXACT else 0),
+        np.empty(rows if kind != EXACT else 0),
+    )
     u2 = np.empty((n2, 2))
     for j in range(n2):
         angle = axes[2, START] + axes[2, STEP] * j

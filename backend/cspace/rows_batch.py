@@ -50,9 +50,9 @@ class Batch(NamedTuple):
     """Rows of one body and one polygon, and room to work.
 
     x, z: (m,) pivots [m]; origin: (m,) angles of the first cells [rad]; margin: (m,) how far the
-    pivots can be from there [m]; lever_x, lever_z: (m,) see Level; place: (m,) which rows of the image they are; blocked, mask:
-    (words, m); doubt: (m,) distance of an arc's end from a cell, in cells; work: (9, m); corners:
-    (2, v, m) one over their distances, directions.
+    pivots can be from there [m]; lever_x, lever_z: (m,) see Level; place: (m,) which rows of the
+    image they are; blocked, mask: (words, m); doubt: (m,) distance of an arc's end from a cell, in
+    cells; work: (9, m); corners: (2, v, m) one over their distances, directions.
     """
 
     x: Array

@@ -85,8 +85,8 @@ def offsets_within(
     sign: int,
     out: Array,
 ) -> None:
-    """Move distances along n by how far the pivots can be from where they are, see Level: R(d) v - v
-    is at most |d (n x v)| + d^2 |v| / 2 along n. sign: of the margins.
+    """Move distances along n by how far the pivots can be from where they are, see Level: along n,
+    R(d) v - v is at most |d (n x v)| + d^2 |v| / 2. sign: of the margins.
     """
     for r in range(len(out)):
         by_boom = boom * abs(nz * (x[r] - boom_x) - nx * (z[r] - boom_z))
