@@ -31,7 +31,7 @@ from backend.shell.app.feed import Frames
 from backend.shell.app.server import WebServer, bind
 from backend.shell.app.viewer_proxy import Hooks, viewer_router
 from backend.shell.app.wire import dumps
-from backend.shell.hub import Hub
+from backend.shell.hub import Hub, OncePerSnapshot
 from backend.shell.image_worker import ImageWorker
 from backend.shell.kinds import EXACT, REGIONS, SUN, ZONE, Recipe, Wishes
 from backend.shell.link.receiver import Receiver
@@ -135,6 +135,7 @@ class Station:
         self._demo_began = demo_began
         self._tip_heights: dict[str, float] = {}
         self.hub = Hub()
+        self.document = OncePerSnapshot(self._document)
         session = open_session(options.listen, options.connect, mode="router")
         self._closing.callback(session.close)
         prefixes = {machine.prefix: machine.name for machine in site.machines}
@@ -188,7 +189,7 @@ class Station:
         """Close everything, in the reverse order of opening."""
         self._closing.close()
 
-    def document(self, snapshot: Snapshot) -> dict[str, Any]:
+    def _document(self, snapshot: Snapshot) -> dict[str, Any]:
         """A snapshot as plain JSON, with what only a running backend knows."""
         document = snapshot_document(snapshot, self.config)
         rate = self.runner.image_timing["images"].timing().rate

@@ -105,7 +105,7 @@ def turned_touches(
     half_cell: float,
     kind: int,
 ) -> bool:
-    """Whether some pair touches: at the angle for kind 0; for 1 (may) and -1 (must) as `decided`."""
+    """Whether some pair touches: at the angle for kind 0, as `decided` for 1 (may), -1 (must)."""
     if kind != 0:
         return bool(decided(own, others, pairs, radius, angle, half_cell, kind < 0))
     cos, sin = math.cos(angle), math.sin(angle)
