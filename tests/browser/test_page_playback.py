@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 from exact_frames import exact, margins, zone
-from playback_frames import BEGIN, DURATION, EVENTS, NOTE, PERIOD, Player
+from playback_frames import DURATION, EVENTS, NOTE, PERIOD, Player
 from playwright.sync_api import Browser, Route, WebSocketRoute
 from test_page_exact import CLIPPED, OUTSIDE, ExactFeed
 from test_page_offline import machine, site, snapshot, sun
