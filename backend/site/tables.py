@@ -225,7 +225,7 @@ class ObstacleMesh(Table):
 
 
 class Can(Table):
-    """CAN logs. map: which signal is what, a path seen from the site file (scenes/can/README.md)."""
+    """CAN logs. map: which signal is what, a path seen from the site file; see scenes/can."""
 
     map: Annotated[str, Field(min_length=1)] | None = None
 

@@ -237,7 +237,7 @@ def test_keys_play_step_and_jump(feed: PlaybackFeed) -> None:
     press("+", "speed", 2.0)
     press("-", "speed", 1.0)
     press("Space", "play")
-    # A mouse click leaves the keys with the player; the keyboard's focus keeps Space for the button.
+    # A click leaves the keys with the player; the keyboard's focus keeps Space for the button.
     feed.page.click("#t-loop")
     press("Space", "pause")
     feed.page.focus("#t-next")

@@ -1,4 +1,4 @@
-"""`cockpit play` as a process: the page's websocket says PLAYBACK, and nothing can reach a machine."""
+"""`cockpit play` as a process: the websocket says PLAYBACK, and nothing can reach a machine."""
 
 from __future__ import annotations
 
