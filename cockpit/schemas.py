@@ -8,6 +8,7 @@ from pydantic import BaseModel
 
 from backend.documents.assessment import AssessmentDocument
 from backend.documents.bench import BenchDocument
+from backend.documents.conversion import ConversionDocument, ExportDocument
 from backend.documents.cspace import CspaceDocument
 from backend.documents.recordings import RecordingsDocument, RecoverDocument
 from backend.documents.session import DiffDocument, SeriesDocument, SessionDocument
@@ -21,6 +22,8 @@ SCHEMAS: dict[str, tuple[type[BaseModel], str]] = {
     "state": (StateDocument, "machine states, read by assess"),
     "assess": (AssessmentDocument, "what assess prints"),
     "cspace": (CspaceDocument, "what cspace --json prints"),
+    "convert": (ConversionDocument, "what convert --json prints"),
+    "export": (ExportDocument, "what export --json prints"),
     "bench": (BenchDocument, "what bench --json prints"),
     "recordings": (RecordingsDocument, "what recordings --json prints"),
     "recover": (RecoverDocument, "what recover --json prints"),
