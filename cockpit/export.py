@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -18,8 +17,9 @@ from backend.shell.session.evaluate import evaluate
 from backend.shell.session.export import FORMATS, export_bag, export_tables, recorded_documents
 from backend.shell.session.format import SNAPSHOT
 from backend.shell.session.reader import Session, open_session
-from backend.site.site import Site, load_site, parse_site
+from backend.site.site import Site, load_site
 from cockpit.desk import load_models, make_config
+from cockpit.playback import recorded_site
 
 SOURCES = ("recorded", "evaluated")
 
@@ -59,7 +59,7 @@ def export(
         used = "recorded"
     else:
         used = source or ("recorded" if SNAPSHOT in session.topics else "evaluated")
-        site = site_of(session, site_name)
+        site = load_site(site_name) if site_name else recorded_site(session)
         if used == "recorded":
             if SNAPSHOT not in session.topics:
                 raise InputError(
@@ -79,18 +79,6 @@ def export(
         counts=done.counts,
         notes=list(done.notes),
     )
-
-
-def site_of(session: Session, name: str | None) -> Site:
-    """The site of that name, else the one that was recorded with the session."""
-    if name is not None:
-        return load_site(name)
-    if not session.headers:
-        raise InputError(
-            f"{session.path}: is another program's recording; allowed is --site to say where it is."
-        )
-    header = session.headers[0]
-    return parse_site(tomllib.loads(header.site), Path(header.site_file))
 
 
 def _evaluated(

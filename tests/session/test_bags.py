@@ -16,7 +16,7 @@ from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, W
 from rosbags.typesys import Stores, get_typestore
 
 from backend.shell.link.codec import decode
-from backend.shell.session.convert import convert
+from backend.shell.session.convert import convert, needs_conversion
 from backend.shell.session.format import METADATA, Header
 from backend.site.site import load_site
 
@@ -134,6 +134,19 @@ def test_single_files_and_folders_without_metadata(tmp_path: Path, storage: Stor
     assert read(folder.out)[1] == read(single.out)[1]
     assert len(read(single.out)[1]) == 35
     assert any("metadata.yaml" in problem.text for problem in folder.problems)
+
+
+def test_what_a_player_must_convert_first(tmp_path: Path, repository: Path) -> None:
+    scenes = repository / "scenes"
+    for storage in STORAGES:
+        bag = write_bag(tmp_path / storage.name, messages("/left", 1), storage)
+        (file,) = (f for f in bag.iterdir() if f.suffix != ".yaml")
+        sqlite = storage is StoragePlugin.SQLITE3
+        assert needs_conversion(bag) is needs_conversion(file) is sqlite
+    assert needs_conversion(scenes / "can" / "sun2020-appendix-a.asc")
+    assert not needs_conversion(scenes / "sessions" / "sun2020-experiment.mcap")
+    assert not needs_conversion(tmp_path / "nowhere.csv")
+    assert not needs_conversion(scenes)
 
 
 @pytest.mark.parametrize("mode", [CompressionMode.FILE, CompressionMode.MESSAGE])

@@ -58,8 +58,7 @@ def read_can_log(
     chosen = can_map or site.can_map
     if chosen is None:
         raise InputError(
-            f"{path}: a CAN log needs a map; allowed are --map FILE, or [can] map in "
-            "the site file."
+            f"{path}: a CAN log needs a map; allowed are --map FILE, or [can] map in the site file."
         )
     mapping = load_can_map(chosen, site)
     file = dbc or mapping.dbc
