@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import fields, replace
+from itertools import count
 
 from backend.pipeline.config import Config
 from backend.pipeline.records import Inputs, Snapshot
@@ -68,13 +69,18 @@ def evaluate(
 ) -> Iterator[tuple[Portion, Snapshot]]:
     """Snapshots of a session's portions from start to end [ns].
 
-    every: 1 steps the pipeline for each portion, bit by bit as live; n for each n-th, for which
-    the others' samples are kept.
+    every: 1 steps the pipeline for each portion, bit by bit as live; n for each n-th and the last,
+    for which the others' samples are kept.
     """
     evaluator = Evaluator(config)
     span = max(session.end - session.begin, 1)
-    for k, portion in enumerate(portions(session, topics, start, end)):
-        if (k + 1) % every:
+    several = portions(session, topics, start, end)
+    following = next(several, None)
+    for k in count(1):
+        portion, following = following, next(several, None)
+        if portion is None:
+            return
+        if k % every and following is not None:
             evaluator.put_aside(portion)
         else:
             yield portion, evaluator.step(portion)

@@ -11,6 +11,7 @@ from backend.fusion.clock import WINDOW
 from backend.fusion.streams import SPAN
 from backend.pipeline.config import Config
 from backend.pipeline.records import Inputs, Snapshot
+from backend.safety.alarms import OFF_DELAY, ON_DELAY
 from backend.shell.session.cycles import Portion, Topics, document, has_cycles, portions, samples
 from backend.shell.session.evaluate import Evaluator
 from backend.shell.session.format import CLOCK, SNAPSHOT, Message
@@ -20,8 +21,8 @@ from backend.shell.session.recorded_snapshot import NotASnapshot, recorded_snaps
 SECOND = 1_000_000_000
 WARM = round((SPAN + 0.5) * SECOND)  # what the fusion remembers, and the radio's delay [ns]
 CLOCKS = round((WINDOW + 1.0) * SECOND)  # what the estimate of a clock remembers [ns]
-SETTLE = round(0.45 * SECOND)  # steps before the one that is shown: alarms come on after 0.3 s
-SETTLE_EVERY = 5  # portions
+SETTLE = round((ON_DELAY + OFF_DELAY + 0.05) * SECOND)  # what alarms remember [ns]
+SETTLE_EVERY = 8  # portions to a step then, before the one that is shown
 LOOK_BACK = 30 * SECOND  # for the newest recorded snapshot
 
 
@@ -69,7 +70,7 @@ class EvaluatedTrack:
     def seek(self, time: int) -> Shown | None:
         """With what the fusion remembers at `time`, so that poses are what they were.
 
-        Counters begin anew, and so do alarms that are older than half a second.
+        Counters begin anew, and so do the times since when alarms hold.
         """
         self._evaluator = Evaluator(self._config)
         start = max(time - WARM, self._session.begin - 1)
