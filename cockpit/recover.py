@@ -9,7 +9,8 @@ from rich.progress import Progress
 
 from backend.documents.recordings import RecoverDocument, RecoveredFile, SkippedRow
 from backend.errors import InputError
-from backend.shell.session.recover import Saved, recover
+from backend.shell.session.damaged import Saved
+from backend.shell.session.recover import recover
 
 
 def run_recover(path: Path, out: Path | None, as_json: bool) -> None:

@@ -51,7 +51,7 @@ class Feeder:
         self._clock = clock
         self._target = target
         self._lock = threading.Lock()  # held for microseconds only
-        self._inbox: list[Record] = []
+        self._inbox: list[tuple[int, list[Entry]]] = []  # with the first one's sequence number
         self._bytes = 0  # of inbox and pending
         self._sequence = 0
         self._lost, self._lost_at = 0, -LOST_TOLD
@@ -67,7 +67,10 @@ class Feeder:
         self._thread = threading.Thread(target=self._run, name="recorder", daemon=True)
 
     def put(self, entries: list[Entry]) -> None:
-        """All of them, or none when the queue is full. Lost ones leave a gap in the sequence."""
+        """All of them, or none when the queue is full. Lost ones leave a gap in the sequence.
+
+        The list must not be changed afterwards.
+        """
         size = sum(len(entry[3]) + OVERHEAD for entry in entries)
         with self._lock:
             first = self._sequence
@@ -77,7 +80,7 @@ class Feeder:
                 self._lost_at = self._clock()
                 return
             self._bytes += size
-            self._inbox += [Record(first + k, *entry) for k, entry in enumerate(entries)]
+            self._inbox.append((first, entries))
 
     def line(self) -> str:
         """What is wrong, in words; empty while all is well."""
@@ -169,7 +172,8 @@ class Feeder:
         rotate = self._rotate  # before the inbox: what was put before it is in this part
         with self._lock:
             news, self._inbox = self._inbox, []
-        self._pending.extend(news)
+        for first, entries in news:
+            self._pending.extend(Record(first + k, *entry) for k, entry in enumerate(entries))
         size, records = 0, []
         for record in itertools.islice(self._pending, self._sent, None):
             size += len(record.data)

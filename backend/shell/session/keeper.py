@@ -12,8 +12,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 from backend.errors import InputError
+from backend.shell.session.damaged import Damaged
 from backend.shell.session.format import Header, Message
-from backend.shell.session.recover import Damaged, NothingSaved, recover
+from backend.shell.session.recover import NothingSaved, recover
 from backend.shell.session.ring import (
     LOCK,
     Limits,
@@ -36,7 +37,7 @@ CHUNK_SECONDS = 0.5  # at most this much is in a chunk
 SPACE_PERIOD = 0.5  # between two looks at the disk's free space [s]
 NOTHING = 2**20  # a cut part without a whole chunk that is smaller is of no use [bytes]
 TRIES = 50  # to finish a part after a failed write
-GRACE = 3.0  # from SIGTERM until the process ends, unless its parent does before [s]
+GRACE = 10.0  # from SIGTERM until the process ends, unless its parent does before [s]
 
 
 class Record(NamedTuple):

@@ -13,6 +13,8 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
+import msgspec
+
 from backend.errors import InputError
 from backend.fusion.samples import ClockSample
 from backend.pipeline.records import Inputs, Notice, Snapshot
@@ -199,7 +201,7 @@ class NoRecorder:
 
 
 def _clock_text(item: ClockSample) -> bytes:
-    return dumps(
+    return msgspec.json.encode(
         {
             "machine": item.machine,
             "sent": item.sent,
@@ -222,4 +224,4 @@ def _cycle_text(inputs: Inputs, snapshot: Snapshot) -> bytes:
         document["lost"] = inputs.lost
     if inputs.notices:
         document["notices"] = [{"key": n.key, "line": n.line} for n in inputs.notices]
-    return dumps(document)
+    return msgspec.json.encode(document)  # numbers come back bit by bit, and it is quick
