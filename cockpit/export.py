@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -79,6 +80,15 @@ def export(
         counts=done.counts,
         notes=list(done.notes),
     )
+
+
+def export_zip(path: Path, kind: str, out: Path, site_name: str | None, source: str) -> Path:
+    """The same as one .zip file in the folder `out`, for a browser. Raises InputError."""
+    folder = out / f"{path.stem}-{kind}"
+    export(path, kind, folder, site_name, source)
+    archive = shutil.make_archive(str(folder), "zip", root_dir=out, base_dir=folder.name)
+    shutil.rmtree(folder)
+    return Path(archive)
 
 
 def _evaluated(

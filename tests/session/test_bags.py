@@ -156,6 +156,22 @@ def test_compressed_bags(tmp_path: Path, mode: CompressionMode) -> None:
     assert done.messages == 35
 
 
+def test_clouds_of_points_pass_as_they_are(tmp_path: Path) -> None:
+    field = T["sensor_msgs/msg/PointField"]("x", 0, 7, 1)
+    content: list[tuple[str, int, Any]] = []
+    for k in range(3):
+        data = np.arange(4000, dtype=np.uint8)
+        cloud = T["sensor_msgs/msg/PointCloud2"](
+            header(START), 1, 1000, [field], False, 4, 4000, data, True
+        )
+        content.append(("/left/points", START + k, cloud))
+    done = convert(write_bag(tmp_path / "bag", content), load_site("demo"), tmp_path / "o.mcap")
+    _, found = read(done.out)
+    assert [data for _, _, data in found] == [
+        bytes(ROS.serialize_cdr(m, m.__msgtype__)) for _, _, m in content
+    ]
+
+
 def test_topics_by_the_site_file(tmp_path: Path, repository: Path) -> None:
     text = (repository / "scenes" / "sites" / "demo.toml").read_text()
     named = text.replace(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import suppress
@@ -119,7 +120,8 @@ def _messages(
             taken, messages = target.streams.update(time, target.name, value)
             if not taken:
                 signal = f"{target.message.name}.{target.signal}"
-                text = f"{frame.arbitration_id} {signal} = {value:g} is kept out: an outlier"
+                why = "an outlier" if math.isfinite(value) else "not a number"
+                text = f"{frame.arbitration_id} {signal} = {value:g} is kept out: {why}"
                 problems.add(f"{where}, {time / 1e9:.3f} s", text, kind=f"outlier {signal}")
                 events.append(Event(time, target.machine, text))
             yield from messages
