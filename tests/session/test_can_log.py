@@ -206,6 +206,22 @@ def test_a_clock_that_goes_back_goes_on_in_the_session(tmp_path: Path) -> None:
     assert np.diff(stamps) == pytest.approx([0.02, 0.02, 0.0, 0.02, 0.02], abs=1e-6)
 
 
+def test_times_that_are_none(tmp_path: Path) -> None:
+    row = "{t},0x193,0,0,0,2,ARA="
+    text = "timestamp,arbitration_id,extended,remote,error,dlc,data\n"
+    for t in ("-5.0", "nan", "1.0", "inf", "2.0"):
+        for identifier in (402, 404, 406):
+            text += row.format(t=t).replace("0x193", hex(identifier)) + "\n"
+    (tmp_path / "l.csv").write_text(text)
+    done = convert(tmp_path / "l.csv", load_site(SITE), tmp_path / "o.mcap")
+    assert (done.begin, done.end) == (0, 2_000_000_000)
+    assert done.counts["/a/joint_states"] == 3
+    assert {p.text: p.count for p in done.problems} == {
+        "times before 1970 count as its beginning": 3,
+        "frames without a time are left out": 6,
+    }
+
+
 @pytest.mark.parametrize("keep", [0.001, 0.02, 0.5, 0.9])
 def test_cut_logs(tmp_path: Path, keep: float) -> None:
     frames = [f for k in range(2000) for f in angles(k * 0.02, {402: 1, 404: 2, 406: 3})]

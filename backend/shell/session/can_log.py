@@ -106,6 +106,9 @@ def _messages(
             skipped[_id(*identifier)] = unknown[identifier]
             continue
         known += 1
+        if not math.isfinite(frame.timestamp):
+            problems.add(where, "frames without a time are left out")
+            continue
         time = clock.place(round(frame.timestamp * 1e9), where)
         try:
             values = wanted[0].message.decode(bytes(frame.data), decode_choices=False)
