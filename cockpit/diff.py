@@ -15,7 +15,8 @@ from cockpit.playback import see
 def run_diff(path: Path, site: str | None, as_json: bool) -> None:
     """Print the diff document, or what is in it in words."""
     seen = see(path, site)
-    with Progress(console=Console(stderr=True), transient=True) as bar:
+    console = Console(stderr=True)
+    with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task("judging anew", total=1.0)
         result = diff(
             seen.session, seen.topics, seen.config, lambda share: bar.update(task, completed=share)

@@ -56,7 +56,8 @@ class Seen:
 
 def open_with_progress(path: Path) -> Session:
     """A session; a bar is shown while a file without an index is walked through."""
-    with Progress(console=Console(stderr=True), transient=True) as bar:
+    console = Console(stderr=True)
+    with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task(f"reading {path.name}", total=1.0)
         return open_session(path, lambda share: bar.update(task, completed=share))
 

@@ -20,7 +20,7 @@ from backend.shell.app.feed import Frames
 from backend.shell.app.server import WebServer, bind
 from backend.shell.app.viewer_proxy import Hooks, viewer_router
 from backend.shell.app.wire import dumps
-from backend.shell.hub import Hub
+from backend.shell.hub import Hub, OncePerSnapshot
 from backend.shell.link.receiver import Receiver
 from backend.shell.link.relay import Relay
 from backend.shell.link.session import open_session
@@ -80,6 +80,7 @@ class Station:
         self.config = make_config(site, models, options.own, options.mode)
         self._demo_began = demo_began
         self.hub = Hub()
+        self.document = OncePerSnapshot(self._document)
         session = open_session(options.listen, options.connect, mode="router")
         self._closing.callback(session.close)
         prefixes = {machine.prefix: machine.name for machine in site.machines}
@@ -134,7 +135,7 @@ class Station:
         """Close everything, in the reverse order of opening."""
         self._closing.close()
 
-    def document(self, snapshot: Snapshot) -> dict[str, Any]:
+    def _document(self, snapshot: Snapshot) -> dict[str, Any]:
         """A snapshot as plain JSON, with what only a running backend knows."""
         document = snapshot_document(snapshot, self.config)
         rate = self.runner.image_timing["images"].timing().rate

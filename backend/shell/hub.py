@@ -10,6 +10,21 @@ from typing import Any
 from backend.pipeline.records import Snapshot
 
 
+class OncePerSnapshot:
+    """What is made of a snapshot, made once for all who ask for the same one. Nobody changes it."""
+
+    def __init__(self, make: Callable[[Snapshot], dict[str, Any]]) -> None:
+        self._make = make
+        self._lock = threading.Lock()
+        self._made: tuple[Snapshot | None, dict[str, Any]] = (None, {})
+
+    def __call__(self, snapshot: Snapshot) -> dict[str, Any]:
+        with self._lock:
+            if self._made[0] is not snapshot:
+                self._made = (snapshot, self._make(snapshot))
+            return self._made[1]
+
+
 class Hub:
     """Thread-safe exchange between the fast loop, the image workers and all views."""
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 import threading
 import time
 from collections import deque
@@ -21,6 +22,7 @@ from backend.shell.kinds import Made, Wishes
 log = logging.getLogger(__name__)
 
 HISTORY = 500
+REFRESH = 0.2  # [s]
 
 
 @dataclass(frozen=True)
@@ -39,17 +41,24 @@ class Stopwatch:
     def __init__(self) -> None:
         self._seconds: deque[float] = deque(maxlen=HISTORY)
         self._ends: deque[float] = deque(maxlen=HISTORY)
+        self._known = (-math.inf, Timing(0.0, 0.0, 0.0, 0.0))
 
     def add(self, start: float, end: float) -> None:
         self._seconds.append(end - start)
         self._ends.append(end)
 
     def timing(self) -> Timing:
+        """Of the last cycles; up to REFRESH old, for it is asked for with every snapshot."""
         seconds, ends = list(self._seconds), list(self._ends)
         if len(seconds) < 2:
             return Timing(0.0, 0.0, 0.0, 0.0)
-        p50, p95, p99 = (float(v) for v in 1e3 * np.percentile(seconds, [50, 95, 99]))
-        return Timing(p50, p95, p99, (len(ends) - 1) / max(ends[-1] - ends[0], 1e-9))
+        until, known = self._known
+        if not until <= ends[-1] < until + REFRESH:
+            p50, p95, p99 = (float(v) for v in 1e3 * np.percentile(seconds, [50, 95, 99]))
+            rate = (len(ends) - 1) / max(ends[-1] - ends[0], 1e-9)
+            known = Timing(p50, p95, p99, rate)
+            self._known = (ends[-1], known)
+        return known
 
 
 class ImageMaker(Protocol):

@@ -1,4 +1,4 @@
-"""`cockpit play` as a process: the page's websocket says PLAYBACK, and nothing can reach a machine."""
+"""`cockpit play` as a process: it says PLAYBACK, obeys the page, and can reach no machine."""
 
 from __future__ import annotations
 
@@ -151,7 +151,7 @@ def test_commands_reach_nobody(playing: Backend) -> None:
     """There is no link at all in this process, and whoever listens around it hears nothing."""
     maps = Path(f"/proc/{playing.process.pid}/maps").read_text()
     assert "zenoh" not in maps, "the library is not even loaded"
-    heard: list[str] = []
+    heard: list[Any] = []
     endpoint = with_port("tcp/127.0.0.1:0")
     with open_link(listen=[endpoint], mode="router") as link:
         subscriber = link.declare_subscriber(

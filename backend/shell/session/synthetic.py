@@ -9,7 +9,7 @@ import json
 import math
 import struct
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from heapq import merge
 from pathlib import Path
 
@@ -50,6 +50,7 @@ CYCLE_TIME = 0.02  # [s]
 SNAPSHOT_EVERY = 5  # cycles
 CLOCK_EVERY = 25  # cycles
 LOCAL = 5000.0  # the local monotonic clock when a session begins [s]
+LEAD = 5.0  # before what is repeated: time to become valid [s]
 EPOCH = 1_790_000_000.0  # the machines' clocks then [s]
 _STAMP = struct.Struct("<II")  # of a header, behind the four bytes that begin a CDR message
 
@@ -58,9 +59,9 @@ Progress = Callable[[float], None]
 
 @dataclass(frozen=True)
 class Script:
-    """begin: schedule time at which the recording begins; duration; lap: what is repeated after
-    the first `begin + lap` seconds, None for nothing [s]. cycles: whether they are recorded;
-    snapshots: whether conclusions are.
+    """begin: schedule time at which the recording begins; duration; lap: how much of the simulated
+    stretch is repeated until the end, None for nothing [s]. cycles: whether they are recorded;
+    snapshots: whether conclusions are; every: 1 judges each cycle, as live; n each n-th.
     """
 
     duration: float
@@ -68,6 +69,7 @@ class Script:
     lap: float | None = None
     cycles: bool = True
     snapshots: bool = True
+    every: int = 1
 
 
 @dataclass
@@ -98,7 +100,9 @@ def synthesize(
     )
     writer = SessionWriter(path, header)
     lived = Lived()
-    length = script.duration if script.lap is None else min(script.duration, script.lap + 60.0)
+    length = script.duration
+    if script.lap is not None:
+        length = min(length, script.lap + LEAD)
     heard = list(_heard(site, config.machines, script.begin, length, lambda s: progress(0.2 * s)))
     base = list(
         _judged(heard, site, config, script, length, lived, lambda s: progress(0.2 + s / 2))
@@ -141,7 +145,7 @@ def _machine(
     rng = np.random.default_rng((program.seed, 1))
     state = on_schedule(program, begin, position, *start.attitude)
     rig = sensors(machine, site)
-    due = [0.0] * len(rig)
+    due, latest = [0.0] * len(rig), 0.0
     found = []
     for k in range(round(length / DT)):
         t = k * DT
@@ -155,11 +159,12 @@ def _machine(
             if cut:
                 continue
             data = sensor.measure(state, EPOCH + t, rng)
-            # The clock counts whole nanoseconds; no two messages arrive at once.
-            arrival = round((LOCAL + arrival_time(t, radio) + rng.uniform(0.0, 2e-3)) * 1e9) / 1e9
+            # The clock counts whole nanoseconds; messages arrive one after the other, as sent.
+            latest = max(latest + rng.uniform(2e-5, 2e-4), arrival_time(t, radio))
+            arrival = round((LOCAL + latest) * 1e9) / 1e9
             topic = key(sensor.topic, entry.prefix, **sensor.fields)
             found.append((arrival, name, topic, topic[len(entry.prefix) + 1 :], data))
-    return sorted(found, key=lambda one: one[0])
+    return found
 
 
 def _judged(
@@ -175,10 +180,10 @@ def _judged(
     offset = round((EPOCH - LOCAL) * 1e9)
     rng = np.random.default_rng(7)
     state, position, said = initial(config), 0, ""
+    samples: list[Sample] = []
     cycles = round(length / CYCLE_TIME)
     for cycle in range(cycles):
         now = round((LOCAL + (cycle + 1) * CYCLE_TIME + rng.uniform(0.0, 1e-3)) * 1e9) / 1e9
-        samples: list[Sample] = []
         while position < len(heard) and heard[position][0] <= now:
             arrival, name, topic, suffix, data = heard[position]
             position += 1
@@ -191,9 +196,10 @@ def _judged(
                 yield Message(CLOCK, stamp(trip.received, offset), dumps(vars(trip)))
         if script.cycles:
             yield Message(CYCLE, stamp(now, offset), dumps({"cycle": cycle, "time": now}))
-        if not script.snapshots:
+        if not script.snapshots or cycle % script.every:
             continue
-        state, snapshot = step(state, Inputs(tuple(samples)), now, config)
+        state, snapshot = step(replace(state, cycle=cycle), Inputs(tuple(samples)), now, config)
+        samples.clear()
         lived.snapshots.append(snapshot)
         document = snapshot_document(snapshot, config)
         alarms = dumps({"alarms": document["alarms"]})
