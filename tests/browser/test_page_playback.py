@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 from exact_frames import exact, margins, zone
-from playback_frames import BEGIN, DURATION, EVENTS, NOTE, PERIOD, Player
+from playback_frames import DURATION, EVENTS, NOTE, PERIOD, Player
 from playwright.sync_api import Browser, Route, WebSocketRoute
 from test_page_exact import CLIPPED, OUTSIDE, ExactFeed
 from test_page_offline import machine, site, snapshot, sun
@@ -154,6 +154,7 @@ def test_playback_fits_and_says_so(
     where = f"playback-{size[0]}x{size[1]}"
     feed.page.screenshot(path=artifacts / f"{where}.png")
     feed.player.time = 246.0
+    feed.player.loop = [230.0, 262.0]
     feed.page.keyboard.press("Space")
     feed.page.click("#t-session")
     stop = {**LOW, "level": "STOP", "line": "STOP · LEFT bucket ↔ RIGHT boom · 0.08 m"}
@@ -237,7 +238,7 @@ def test_keys_play_step_and_jump(feed: PlaybackFeed) -> None:
     press("+", "speed", 2.0)
     press("-", "speed", 1.0)
     press("Space", "play")
-    # A mouse click leaves the keys with the player; the keyboard's focus keeps Space for the button.
+    # A click leaves the keys with the player; the keyboard's focus keeps Space for the button.
     feed.page.click("#t-loop")
     press("Space", "pause")
     feed.page.focus("#t-next")
@@ -464,6 +465,17 @@ def test_ages_of_recorded_streams_are_as_recorded(feed: PlaybackFeed) -> None:
         ),
         machines=machines,
     )
+
+
+def test_sound_that_was_on_is_off_in_playback(feed: PlaybackFeed) -> None:
+    said = feed.page.locator("#sound")
+    feed.send(lambda: feed.page.inner_text("#mode") == "LIVE", mode="LIVE")
+    assert feed.page.is_hidden("#transport")
+    assert feed.page.is_hidden("#watermark")
+    feed.page.keyboard.press("m")
+    feed.send(lambda: "SOUND ON" in said.inner_text(), mode="LIVE")
+    feed.send(lambda: "SOUND OFF" in said.inner_text() and "in playback" in said.inner_text())
+    assert feed.page.get_attribute("body", "data-sound") == "off"
 
 
 def test_no_key_or_click_reaches_anything_but_the_player(feed: PlaybackFeed) -> None:
