@@ -1,6 +1,6 @@
 // The timeline of a recorded session: events, cursor, loop; dragging seeks, dragging with Shift marks a loop.
 
-import { C, rgba, size } from "../theme.js";
+import { C, size } from "../theme.js";
 import { number, scale } from "../axis.js";
 import { clock, tickText, timeTicks, wallClock } from "../clock.js";
 import { clear, label, message, segment } from "../pen.js";
@@ -28,10 +28,12 @@ function ruler(g, map, y, duration) {
 
 function section(g, [a, b], map, top, bottom) {
   const x0 = map(a), x1 = map(b);
-  g.fillStyle = rgba(C.playback, 0.35);
-  g.fillRect(x0, top, x1 - x0, bottom - top);
+  // Bars above and below: a veil would change the colours of the levels.
+  g.fillStyle = C.playbackLine;
+  g.fillRect(x0, top - 3, x1 - x0, 3);
+  g.fillRect(x0, bottom, x1 - x0, 3);
   for (const [x, way] of [[x0, 1], [x1, -1]]) {
-    segment(g, x, top, x, bottom, C.playbackLine, 2);
+    segment(g, x, top - 3, x, bottom + 3, C.playbackLine, 2);
     g.fillStyle = C.playbackLine; // handles point inwards
     g.beginPath();
     g.moveTo(x, top);
