@@ -28,7 +28,7 @@ from cockpit.bench_cspace import cspace_rows
 from cockpit.bench_input import cycles
 from cockpit.bench_live import crowded_rows, live_rows
 from cockpit.bench_rows import percentile_rows
-from cockpit.station import load_models, make_config
+from cockpit.desk import load_models, make_config
 
 CYCLES = 500
 

@@ -12,6 +12,8 @@ from typing import Annotated
 import typer
 
 from backend.errors import InputError
+from cockpit.cli_playback import add_commands
+from cockpit.cli_recordings import recordings
 
 app = typer.Typer(
     name="cockpit",
@@ -36,6 +38,12 @@ Connect = Annotated[
     list[str] | None, typer.Option(help="Zenoh endpoint to connect to: a router, another backend.")
 ]
 
+NoRecord = Annotated[bool, typer.Option("--no-record", help="Record nothing.")]
+Record = Annotated[
+    Path | None,
+    typer.Option(help="Folder of all recordings; default: the site file's, or the user's state."),
+]
+
 
 @app.command()
 def demo(
@@ -43,11 +51,21 @@ def demo(
     host: Host = "127.0.0.1",
     port: Port = 8000,
     no_browser: NoBrowser = False,
+    no_record: NoRecord = False,
+    record: Record = None,
 ) -> None:
     """Run a site with simulated machines, each in its own process, and open the page."""
     from cockpit.run import run_demo
 
-    run_demo(site, host, port, open_browser=not no_browser, until=_interrupted())
+    run_demo(
+        site,
+        host,
+        port,
+        open_browser=not no_browser,
+        until=_interrupted(),
+        recording=not no_record,
+        record=record,
+    )
 
 
 @app.command()
@@ -61,6 +79,8 @@ def serve(
     machines: Annotated[
         str, typer.Option(help="Machines this backend answers for, e.g. left,right; default all.")
     ] = "",
+    no_record: NoRecord = False,
+    record: Record = None,
 ) -> None:
     """Run the cockpit on live machines, which publish to the Zenoh endpoint it listens on."""
     from cockpit.run import run_serve
@@ -75,6 +95,8 @@ def serve(
         connect=tuple(connect or ()),
         own=own,
         until=_interrupted(),
+        recording=not no_record,
+        record=record,
     )
 
 
@@ -157,6 +179,51 @@ def cspace(
 
 
 @app.command()
+def convert(
+    recording: Annotated[
+        Path, typer.Argument(help="rosbag2 folder or file, CAN log, or table of poses.")
+    ],
+    site: Site,
+    out: Annotated[Path, typer.Option(help="The .mcap file to write.")],
+    dbc: Annotated[
+        Path | None, typer.Option(help="CAN logs: the DBC; omitted: the one the map names.")
+    ] = None,
+    map_: Annotated[
+        Path | None,
+        typer.Option("--map", help="CAN logs: which signal is what; a shipped name or a file."),
+    ] = None,
+    json_: Annotated[bool, typer.Option("--json", help="Print JSON instead of words.")] = False,
+) -> None:
+    """Turn another program's recording into a session that this one plays."""
+    from cockpit.convert import run_convert
+
+    run_convert(recording, site, out, dbc, map_, json_)
+
+
+@app.command()
+def export(
+    session: Annotated[Path, typer.Argument(help="Session: a file or a folder of files.")],
+    format_: Annotated[str, typer.Option("--format", help="csv, parquet or ros2.")],
+    out: Annotated[Path, typer.Option(help="The folder to write.")],
+    site: Annotated[
+        str | None, typer.Option(help="Site, where the session does not hold its own.")
+    ] = None,
+    source: Annotated[
+        str,
+        typer.Option(
+            help="Tables of what was recorded, or of what is evaluated now; the default "
+            "is recorded where there are snapshots."
+        ),
+    ] = "",
+    json_: Annotated[bool, typer.Option("--json", help="Print JSON instead of words.")] = False,
+) -> None:
+    """Write a session as tables of poses, clearances and alarms, or as a ROS 2 recording."""
+    from cockpit.export import run_export
+
+    run_export(session, format_, out, site, source, json_)
+
+
+@app.command()
 def schema(
     name: Annotated[
         str, typer.Argument(help="Document's name; without it the names are listed.")
@@ -181,12 +248,32 @@ def bench(
     run_bench(json_, seconds)
 
 
+@app.command()
+def recover(
+    path: Annotated[Path, typer.Argument(help="A cut or damaged .mcap file, or a recording.")],
+    out: Annotated[
+        Path | None, typer.Option(help="The .mcap file to write; default: beside the original.")
+    ] = None,
+    json_: Annotated[bool, typer.Option("--json", help="Print JSON instead of words.")] = False,
+) -> None:
+    """Write a whole file of what can be read of a damaged recording; the original stays."""
+    from cockpit.recover import run_recover
+
+    run_recover(path, out, json_)
+
+
+app.add_typer(recordings, name="recordings")
+
+
 def _interrupted() -> threading.Event:
     """Set by Ctrl-C or SIGTERM."""
     event = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: event.set())
     return event
+
+
+add_commands(app, _interrupted)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

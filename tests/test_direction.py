@@ -46,6 +46,7 @@ LIBRARIES = {
     "zenoh": "backend.shell.link",
     "rosbags": "backend.shell",
     "mcap": "backend.shell.session",
+    "zstandard": "backend.shell.session",
     "can": "backend.shell.session",
     "cantools": "backend.shell.session",
     "pyarrow": "backend.shell.session",

@@ -25,6 +25,10 @@ Prefix: TypeAlias = Annotated[
     str, Field(pattern=r"^[A-Za-z0-9_-]+(/[A-Za-z0-9_-]+)*$", max_length=128)
 ]
 
+RosTopic: TypeAlias = Annotated[
+    str, Field(pattern=r"^/[A-Za-z0-9_-]+(/[A-Za-z0-9_-]+)*$", max_length=256)
+]
+
 
 class Table(BaseModel):
     """One table: unknown fields, wrong types, NaN and infinities are refused."""
@@ -116,6 +120,34 @@ class MachineSim(Table):
         return dict(self.model_extra or {})
 
 
+class MachineTopics(Table):
+    """ROS 2 topics that one machine's streams have in other people's recordings.
+
+    A stream that is not named is looked for under its own key, "/left/joint_states"; imu: by link
+    ("base", "boom"). One topic may serve two streams of one machine, as an INS's orientation does.
+    """
+
+    joint_states: RosTopic | None = None
+    gnss_fix: RosTopic | None = None
+    gnss_heading: RosTopic | None = None
+    gnss_projected: RosTopic | None = None
+    points: RosTopic | None = None
+    imu: dict[Name, RosTopic] = Field(default_factory=dict)
+
+    @property
+    def streams(self) -> dict[str, str]:
+        """Topic by stream: "joint_states", "gnss/fix", "imu/base", ..."""
+        named = {
+            "joint_states": self.joint_states,
+            "gnss/fix": self.gnss_fix,
+            "gnss/heading": self.gnss_heading,
+            "gnss/projected": self.gnss_projected,
+            "points": self.points,
+        }
+        imus = {f"imu/{link}": topic for link, topic in self.imu.items()}
+        return {stream: topic for stream, topic in named.items() if topic} | imus
+
+
 class SiteMachine(Table):
     """One machine of the site. Paths are relative to the site file's folder."""
 
@@ -125,6 +157,7 @@ class SiteMachine(Table):
     sidecar: Annotated[str, Field(min_length=1)] | None = None
     prefix: Prefix = ""
     start: Start | None = None
+    topics: MachineTopics = MachineTopics()
     sim: MachineSim = MachineSim()
 
     @model_validator(mode="before")
@@ -191,11 +224,29 @@ class ObstacleMesh(Table):
     max_excess: Annotated[float, Field(gt=0.0, le=5.0)] = 0.15
 
 
+class Can(Table):
+    """CAN logs. map: which signal is what, a path seen from the site file; see scenes/can."""
+
+    map: Annotated[str, Field(min_length=1)] | None = None
+
+
 class Link(Table):
     """Zenoh endpoints, for example "tcp/127.0.0.1:7447"."""
 
     connect: tuple[str, ...] = ()
     listen: tuple[str, ...] = ()
+
+
+class Recording(Table):
+    """What a running cockpit records. folder: of all recordings, relative to the site file; empty
+    for $EXCAVATOR_COCKPIT_RECORDINGS or ~/.local/state/excavator-cockpit/recordings. The oldest
+    parts beyond max_gib [GiB] and max_hours [h] are deleted, except those that are pinned.
+    """
+
+    enabled: bool = True
+    folder: str = ""
+    max_gib: Annotated[float, Field(ge=0.1, le=10_000.0)] = 4.0
+    max_hours: Annotated[float, Field(ge=0.1, le=10_000.0)] = 24.0
 
 
 class SiteTable(Table):
@@ -212,12 +263,15 @@ class SiteTable(Table):
     obstacle: tuple[Obstacle, ...] = ()
     obstacle_mesh: tuple[ObstacleMesh, ...] = ()
     link: Link = Link()
+    recording: Recording = Recording()
+    can: Can = Can()
 
     @model_validator(mode="after")
     def _distinct(self) -> SiteTable:
         _refuse_duplicates("machine", "name", [machine.name for machine in self.machine])
         obstacles = [o.name for o in self.obstacle] + [m.name for m in self.obstacle_mesh]
         _refuse_duplicates("obstacle", "name", obstacles)
+        _refuse_shared_topics(self.machine)
         prefixes = sorted(machine.prefix + "/" for machine in self.machine)
         for shorter, longer in pairwise(prefixes):
             if longer.startswith(shorter):
@@ -238,3 +292,16 @@ def _refuse_duplicates(table: str, field: str, names: list[str]) -> None:
     for name in names:
         if names.count(name) > 1:
             raise ValueError(f'{table} has the {field} "{name}" twice; allowed is a unique {field}')
+
+
+def _refuse_shared_topics(machines: tuple[SiteMachine, ...]) -> None:
+    """A topic carries one machine's data."""
+    owners: dict[str, str] = {}
+    for machine in machines:
+        for topic in machine.topics.streams.values():
+            owner = owners.setdefault(topic, machine.name)
+            if owner != machine.name:
+                raise ValueError(
+                    f'machine has the topic "{topic}" for "{owner}" and for "{machine.name}"; '
+                    "allowed is one machine a topic"
+                )
