@@ -154,6 +154,7 @@ def test_playback_fits_and_says_so(
     where = f"playback-{size[0]}x{size[1]}"
     feed.page.screenshot(path=artifacts / f"{where}.png")
     feed.player.time = 246.0
+    feed.player.loop = [230.0, 262.0]
     feed.page.keyboard.press("Space")
     feed.page.click("#t-session")
     stop = {**LOW, "level": "STOP", "line": "STOP · LEFT bucket ↔ RIGHT boom · 0.08 m"}
@@ -464,6 +465,17 @@ def test_ages_of_recorded_streams_are_as_recorded(feed: PlaybackFeed) -> None:
         ),
         machines=machines,
     )
+
+
+def test_sound_that_was_on_is_off_in_playback(feed: PlaybackFeed) -> None:
+    said = feed.page.locator("#sound")
+    feed.send(lambda: feed.page.inner_text("#mode") == "LIVE", mode="LIVE")
+    assert feed.page.is_hidden("#transport")
+    assert feed.page.is_hidden("#watermark")
+    feed.page.keyboard.press("m")
+    feed.send(lambda: "SOUND ON" in said.inner_text(), mode="LIVE")
+    feed.send(lambda: "SOUND OFF" in said.inner_text() and "in playback" in said.inner_text())
+    assert feed.page.get_attribute("body", "data-sound") == "off"
 
 
 def test_no_key_or_click_reaches_anything_but_the_player(feed: PlaybackFeed) -> None:
