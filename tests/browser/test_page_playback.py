@@ -316,7 +316,7 @@ def test_the_source_is_switched_and_said(feed: PlaybackFeed) -> None:
         lambda: (
             feed.player.source == "evaluated"
             and "judged now" in feed.page.inner_text("#watermark-what")
-            and feed.shown("trends")["sources"] == ["evaluated"]
+            and feed.shown("trends").get("sources") == ["evaluated"]
         )
     )
     feed.player.changes = {"sources": ["recorded"], "source": "recorded"}
@@ -331,7 +331,9 @@ def test_series_follow_the_cursor_and_seek(feed: PlaybackFeed, artifacts: Path) 
     assert shown["window"] == [0, DURATION]
     assert shown["least"] == pytest.approx(0.08, abs=0.05)
     assert set(shown["levels"]) == {"CLEAR", "SLOW", "STOP", "UNKNOWN"}
-    feed.send(lambda: feed.shown("trends")["cursor"] == pytest.approx(feed.player.time, abs=0.7))
+    feed.send(
+        lambda: feed.shown("trends").get("cursor") == pytest.approx(feed.player.time, abs=0.7)
+    )
     feed.page.mouse.click(*feed.at("trends", 0.3, 0.5))
     feed.send(lambda: bool(feed.said("seek")))
     aimed = feed.said("seek")[-1]["value"]
@@ -341,7 +343,7 @@ def test_series_follow_the_cursor_and_seek(feed: PlaybackFeed, artifacts: Path) 
     feed.send(lambda: "as it was: " in feed.page.inner_text("#hover"))
     assert " m, LEFT " in feed.page.inner_text("#hover")
     feed.page.click("#trends-what")
-    feed.send(lambda: feed.shown("trends")["right"] == "angles")
+    feed.send(lambda: feed.shown("trends").get("right") == "angles")
     feed.page.mouse.move(*feed.at("trends", 0.75, 0.5))
     feed.send(lambda: "boom" in feed.page.inner_text("#hover"))
     feed.page.screenshot(path=artifacts / "playback-angles-1920x1080.png")
@@ -361,7 +363,7 @@ def test_series_follow_the_cursor_and_seek(feed: PlaybackFeed, artifacts: Path) 
 def test_comparing_shows_progress_then_a_table_that_jumps(
     feed: PlaybackFeed, artifacts: Path
 ) -> None:
-    assert feed.shown("trends")["sources"] == ["recorded"]
+    assert feed.shown("trends").get("sources") == ["recorded"]
     feed.page.click("#t-compare")
     feed.page.click("#diff-start")
     sheet = feed.page.locator("#sheet-compare")
@@ -371,7 +373,7 @@ def test_comparing_shows_progress_then_a_table_that_jumps(
     text = sheet.inner_text()
     for words in ("LEFT ↔ RIGHT", "42 mm", "4:06.3", "1.4 s earlier", "never", "1 stretch"):
         assert words in text, words
-    feed.send(lambda: feed.shown("trends")["sources"] == ["recorded", "evaluated"])
+    feed.send(lambda: feed.shown("trends").get("sources") == ["recorded", "evaluated"])
     feed.page.screenshot(path=artifacts / "playback-compare-1920x1080.png")
     whole(feed, (1920, 1080))
     feed.page.click("#sheet-compare td button >> text=1:58.6")
