@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 
 import pytest
-from program import run
+from program import cockpit as run
 
 from cockpit.playback import see
 from cockpit.report.make import make_report
