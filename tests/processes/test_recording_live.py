@@ -22,7 +22,7 @@ from rosbags.highlevel import AnyReader
 
 from backend.shell.session.format import SCHEMAS
 
-pytestmark = [pytest.mark.processes, pytest.mark.timeout(240)]
+pytestmark = [pytest.mark.processes, pytest.mark.timeout(400)]
 SITE = "demo"
 MACHINES = ("left", "right")
 
@@ -35,7 +35,7 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Backen
         serve(SITE, "--record", str(folder)) as station,
         simulated(SITE, station.endpoint, *MACHINES),
     ):
-        station.wait_for(all_valid)
+        station.wait_for(all_valid, timeout=150.0)
         yield station, folder
 
 
