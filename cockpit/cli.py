@@ -12,6 +12,8 @@ from typing import Annotated
 import typer
 
 from backend.errors import InputError
+from cockpit.cli_formats import convert, export
+from cockpit.cli_playback import add_commands
 from cockpit.cli_recordings import recordings
 
 app = typer.Typer(
@@ -217,6 +219,8 @@ def recover(
 
 
 app.add_typer(recordings, name="recordings")
+app.command()(convert)
+app.command()(export)
 
 
 def _interrupted() -> threading.Event:
@@ -225,6 +229,9 @@ def _interrupted() -> threading.Event:
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: event.set())
     return event
+
+
+add_commands(app, _interrupted)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

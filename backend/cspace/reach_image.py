@@ -8,14 +8,13 @@ from enum import IntEnum
 
 import numpy as np
 
-from backend.cspace.exact_points import touching
-from backend.cspace.ground import GROUND
+from backend.cspace.exact_points import touching_layers
 from backend.machine import inverse
 from backend.machine.kinematics import end_point
 from backend.machine.model import Machine
 from backend.machine.sun_map import sun_angles
 from backend.spatial import transform
-from backend.spatial.boxes import NO_BOXES, Boxes
+from backend.spatial.boxes import Boxes
 from backend.spatial.types import AnyArray, Array, BoolArray
 
 SELF = "self"
@@ -106,11 +105,9 @@ def reach_image(
     state[~solution.reachable] = ReachState.OUT_OF_REACH
     asked = state == ReachState.FREE
     hit = {name: np.zeros(S.shape, dtype=bool) for name in (*layers, SELF)}
-    for name, boxes in (*layers.items(), (SELF, NO_BOXES)):
-        against, itself = touching(
-            machine, configurations[asked], boxes, name == GROUND, name == SELF
-        )
-        hit[name][asked] = itself if name == SELF else against
+    against, itself = touching_layers(machine, configurations[asked], layers)
+    for name, found in (*against.items(), (SELF, itself)):
+        hit[name][asked] = found
     state[np.any(list(hit.values()), axis=0)] = ReachState.COLLIDING
     near = solution.reachable & (slack < NEAR)
     return ReachImage(swing, reach, swing_edges, reach_edges, state, hit, near, z, attitude, elbow)

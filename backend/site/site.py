@@ -32,7 +32,8 @@ SITES = Path(__file__).resolve().parents[2] / "scenes" / "sites"
 
 @dataclass(frozen=True)
 class Site:
-    """A site as every room reads it. path: the file; relative paths in it are against `folder`."""
+    """A site as every room reads it. path: the file; relative paths in it are against `folder`;
+    can_map: the map of its CAN logs."""
 
     path: Path
     name: str
@@ -47,6 +48,7 @@ class Site:
     meshes: tuple[ObstacleMesh, ...]
     link: Link
     recording: Recording
+    can_map: Path | None = None
 
     @property
     def folder(self) -> Path:
@@ -107,6 +109,7 @@ def parse_site(data: dict[str, Any], path: Path) -> Site:
         )
     except InputError as error:
         raise InputError(f"{path}: frame.{error}") from error
+    can_map = table.can.map
     return Site(
         path=path.resolve(),
         name=table.name,
@@ -121,6 +124,7 @@ def parse_site(data: dict[str, Any], path: Path) -> Site:
         meshes=table.obstacle_mesh,
         link=table.link,
         recording=table.recording,
+        can_map=path.resolve().parent / can_map if can_map else None,
     )
 
 

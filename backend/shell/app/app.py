@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -58,9 +57,12 @@ class Sources:
 
 
 def create_app(
-    sources: Sources, viewer: APIRouter | None = None, hosts: tuple[str, ...] = ("*",)
+    sources: Sources,
+    viewer: APIRouter | None = None,
+    hosts: tuple[str, ...] = ("*",),
+    routers: tuple[APIRouter, ...] = (),
 ) -> FastAPI:
-    """The application. viewer: routes of the 3D view, served below /view.
+    """The application. viewer: routes of the 3D view, served below /view; routers: more routes.
 
     hosts: names under which it answers. A page that binds to the loopback answers to no other
     name, so that a foreign name that resolves to the loopback leads nowhere.
@@ -142,8 +144,8 @@ def create_app(
 
     if sources.recording is not None:
         app.include_router(recording_router(sources.recording))
-    if viewer is not None:
-        app.include_router(viewer)
+    for router in (*routers, *((viewer,) if viewer is not None else ())):
+        app.include_router(router)
     app.mount("/static", StaticFiles(directory=STATIC), name="static")
     return app
 
@@ -162,7 +164,7 @@ def _health(newest: Snapshot | None, sources: Sources) -> dict[str, Any]:
     backend = sources.backend()
     machines = {} if newest is None else newest.machines
     status = [backend["failure"]] if backend["failure"] else []
-    age = None if newest is None else time.monotonic() - newest.time
+    age = sources.frames.hub.age()
     if age is None:
         status.append("no cycle has finished yet")
     elif age > 0.5:

@@ -184,11 +184,28 @@ class SnapshotModel(BaseModel):
     )
     recording: RecordingStateModel | None = Field(None, description="of this backend")
     demo: DemoModel | None = Field(None, description="only in the demo")
+    playback: PlaybackModel | None = Field(None, description="only in playback")
 
 
 class RecordingStateModel(BaseModel):
     state: str = Field(description="on, off or trouble")
     text: str = Field(description="since when it is on, why it is off, or what is wrong")
+
+
+class PlaybackModel(BaseModel):
+    """Where the cursor of a recorded session is. Times are seconds since its beginning."""
+
+    time: float = Field(description="of the cursor [s]")
+    duration: float = Field(description="of the session [s]")
+    wall: float = Field(description="of the cursor, since 1970 [s]")
+    playing: bool
+    speed: float = Field(description="times real time")
+    source: str = Field(description="recorded: as it was; evaluated: as judged by this program")
+    sources: list[str] = Field(description="that the session has")
+    loop: list[float] | None = Field(description="begin and end of what is repeated [s]")
+    catching_up: bool = Field(description="slower than asked for, to let nothing out")
+    title: str
+    note: str = Field(description="what a viewer must know, else empty")
 
 
 class ResolutionModel(BaseModel):
