@@ -36,7 +36,7 @@ def start(folder: Path) -> Feeder:
     header = Header(offset=0, part=0, **texts)  # type: ignore[arg-type]
     feeder = Feeder(Plan(folder, header, Limits(part_seconds=5.0)))
     feeder.start()
-    while not feeder._ready:
+    while not feeder.ready:
         time.sleep(0.01)
     return feeder
 
@@ -80,7 +80,7 @@ def test_kills_of_the_writing_process(tmp_path: Path) -> None:
         pid, before, killed = feeder.pid, feeder._restarted, time.monotonic()
         assert pid is not None
         os.kill(pid, signal.SIGKILL)
-        while feeder._restarted == before or not feeder._ready:
+        while feeder._restarted == before or not feeder.ready:
             if feeder._restarted != before and len(told) < _ + 1:
                 told.append(time.monotonic() - killed)
             put(feeder, k)

@@ -69,7 +69,7 @@ class Fed:
         self.slowest = 0.0
         self.sent: list[Message] = []
         self._messages = iter(SENT)
-        self.until(lambda: self.feeder._ready or target is dying_run, 30.0)
+        self.until(lambda: self.feeder.ready or target is dying_run, 30.0)
 
     def put(self, message: Message | None = None) -> None:
         message = message or next(self._messages)
@@ -138,7 +138,7 @@ def test_a_killed_process_is_told_started_again_and_nothing_is_lost(
         took = recording.until(lambda n=before: recording.feeder._restarted > n, 5.0)
         assert took < 1.0
         assert "ended and was started again" in recording.feeder.line()
-        recording.until(lambda: bool(recording.feeder._ready), 30.0)
+        recording.until(lambda: bool(recording.feeder.ready), 30.0)
         assert recording.feeder.pid != pid
     recording.feed(1.0)
     found = recording.close()

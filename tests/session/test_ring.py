@@ -30,19 +30,22 @@ from backend.shell.session.writer import SessionWriter
 NOW = time.time()
 
 
-def part(folder: Path, number: int, age: float, cycles: int = 20, finish: bool = True) -> Path:
+def part(
+    folder: Path, number: int, age: float, finish: bool = True, now: float | None = None
+) -> Path:
     """A part that was last changed `age` seconds ago."""
+    then = (NOW if now is None else now) - age
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / f"part-{number:04}.mcap"
     writer = SessionWriter(path, header(number, recording=folder.name))
-    for message in messages(cycles, seed=number):
+    for message in messages(20, seed=number):
         writer.write(message)
     writer.flush_chunk()
     if finish:
         writer.close()
     else:
         writer.abandon()
-    os.utime(path, (NOW - age, NOW - age))
+    os.utime(path, (then, then))
     return path
 
 
@@ -129,9 +132,10 @@ def test_the_command_lists_and_pins(tmp_path: Path) -> None:
     root = ("--folder", str(tmp_path))
     assert "no recordings" in cockpit("recordings", *root).stdout
     assert cockpit("recordings", "pin", "x", *root).returncode == 2
-    part(tmp_path / "demo" / "a", 0, 500)
-    part(tmp_path / "demo" / "a", 1, 20, finish=False)
-    part(tmp_path / "other" / "b", 0, 5)
+    now = time.time()
+    part(tmp_path / "demo" / "a", 0, 500, now=now)
+    part(tmp_path / "demo" / "a", 1, 20, finish=False, now=now)
+    part(tmp_path / "other" / "b", 0, 5, now=now)
     done = cockpit("recordings", "pin", "why", "--minutes", "1", "--site", "demo", *root)
     assert done.returncode == 0, done.stderr
     assert str(tmp_path / "demo/pinned/why") in done.stdout

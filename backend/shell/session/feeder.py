@@ -32,7 +32,7 @@ STARTING = 20.0  # the process may take this long to begin [s]
 RESTART = 2.0  # between two attempts to start a process that ends at once [s]
 TOLD = 10.0  # how long a restart is told [s]
 LOST_TOLD = 60.0  # how long a loss is told [s]
-PATIENCE = 4.0  # with the disk at the end [s]
+PATIENCE = 6.0  # with the disk at the end [s]
 
 Entry = tuple[str, str, int, bytes]
 """Topic, ROS 2 type or "", log_time [ns], data."""
@@ -104,6 +104,11 @@ class Feeder:
         deadline = time.monotonic() + timeout
         while self._rotate and time.monotonic() < deadline:
             time.sleep(0.02)
+
+    @property
+    def ready(self) -> bool:
+        """Whether the process takes orders."""
+        return self._ready
 
     @property
     def pid(self) -> int | None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import signal
+import threading
 import time
 from dataclasses import dataclass, replace
 from multiprocessing.connection import Connection
@@ -12,9 +13,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from backend.errors import InputError
-from backend.shell.session.damaged import Damaged
 from backend.shell.session.format import Header, Message
-from backend.shell.session.recover import NothingSaved, recover
+from backend.shell.session.repair import last_sequence, list_parts, repair_last
 from backend.shell.session.ring import (
     LOCK,
     Limits,
@@ -26,7 +26,6 @@ from backend.shell.session.ring import (
     pins_of,
     recordings_of,
 )
-from backend.shell.session.rosbag2 import METADATA_FILE, contents, write_metadata
 from backend.shell.session.writer import SessionWriter
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
@@ -35,7 +34,6 @@ NICENESS = 5
 """Everything that an operator sees goes first."""
 CHUNK_SECONDS = 0.5  # at most this much is in a chunk
 SPACE_PERIOD = 0.5  # between two looks at the disk's free space [s]
-NOTHING = 2**20  # a cut part without a whole chunk that is smaller is of no use [bytes]
 TRIES = 50  # to finish a part after a failed write
 GRACE = 10.0  # from SIGTERM until the process ends, unless its parent does before [s]
 
@@ -94,6 +92,7 @@ class Keeper:
         self._durable: int | None = None
         self._next = 0
         self._began = self._flushed = self._looked = 0.0
+        self._listing = threading.Thread()
 
     def begin(self) -> Answer:
         """Finishes what earlier processes left cut, and tells how far they came."""
@@ -128,6 +127,9 @@ class Keeper:
             self._writer.abandon()
         for writer, _ in self._cut:
             writer.abandon()
+        if self._listing.is_alive():
+            self._listing.join()
+        list_parts(self._plan.folder)
         self._closing.close()
 
     def _finish_cut(self) -> None:
@@ -182,8 +184,10 @@ class Keeper:
         writer.close()
         self._writer = None
         self._note_durable(writer)
-        folder = self._plan.folder
-        write_metadata(folder, [part.path for part in parts_of(folder)])
+        if not self._listing.is_alive():  # of a long recording it takes a while
+            self._listing = threading.Thread(target=list_parts, args=(self._plan.folder,))
+            self._listing.daemon = True
+            self._listing.start()
 
     def _lock(self) -> None:
         folder = self._plan.folder
@@ -217,60 +221,17 @@ class Keeper:
         for part in reversed(parts):
             if self._durable is None:
                 self._durable = last_sequence(part.path)
-            repair(part.path)
+            if self._durable is not None:
+                break
+        repair_last(own)
         for folder in recordings_of(self._plan.site_folder):
             if not in_use(folder):
-                _repair_all(folder)
+                repair_last(folder)
         for folder in pins_of(self._plan.site_folder):
-            _repair_all(folder)
+            repair_last(folder, shared=True)
 
     def _answer(self, trouble: str) -> Answer:
         return Answer(self._durable, trouble, self._next - 1)
-
-
-def _repair_all(folder: Path) -> None:
-    """Whole files in a folder that nobody writes to. A pinned part may still be another name of
-    one that is being written.
-    """
-    cut = [part.path for part in parts_of(folder) if contents(part.path) is None]
-    for path in cut:
-        if path.stat().st_nlink == 1:
-            repair(path)
-    if cut or not (folder / METADATA_FILE).exists():
-        write_metadata(folder, [part.path for part in parts_of(folder)])
-
-
-def repair(path: Path) -> None:
-    """A whole file in the place of a cut one. One that was cut before its first chunk was written
-    holds nothing, and goes.
-    """
-    if contents(path) is not None:
-        return
-    whole = path.with_name(path.name + ".whole")
-    whole.unlink(missing_ok=True)
-    try:
-        recover([path], whole)
-    except NothingSaved:
-        if path.stat().st_size < NOTHING:
-            path.unlink()
-        return
-    stat = path.stat()
-    os.utime(whole, ns=(stat.st_atime_ns, stat.st_mtime_ns))  # its age counts in the ring
-    whole.replace(path)
-
-
-def last_sequence(path: Path) -> int | None:
-    """Sequence number of a file's last message; None when it has none."""
-    try:
-        damaged = Damaged(path)
-    except InputError:
-        return None
-    try:
-        for _ in damaged.messages():
-            pass
-        return damaged.saved.last
-    finally:
-        damaged.close()
 
 
 def _words(error: OSError | InputError) -> str:

@@ -136,6 +136,11 @@ class Recorder:
         return State("trouble", line) if line else State("on", f"since {self._began}")
 
     @property
+    def ready(self) -> bool:
+        """Whether the process that writes has begun."""
+        return self._feeder.ready
+
+    @property
     def pid(self) -> int | None:
         """Of the process that writes."""
         return self._feeder.pid
