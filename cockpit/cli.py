@@ -12,6 +12,7 @@ from typing import Annotated
 import typer
 
 from backend.errors import InputError
+from cockpit.cli_formats import convert, export
 from cockpit.cli_playback import add_commands
 from cockpit.cli_recordings import recordings
 
@@ -179,51 +180,6 @@ def cspace(
 
 
 @app.command()
-def convert(
-    recording: Annotated[
-        Path, typer.Argument(help="rosbag2 folder or file, CAN log, or table of poses.")
-    ],
-    site: Site,
-    out: Annotated[Path, typer.Option(help="The .mcap file to write.")],
-    dbc: Annotated[
-        Path | None, typer.Option(help="CAN logs: the DBC; omitted: the one the map names.")
-    ] = None,
-    map_: Annotated[
-        Path | None,
-        typer.Option("--map", help="CAN logs: which signal is what; a shipped name or a file."),
-    ] = None,
-    json_: Annotated[bool, typer.Option("--json", help="Print JSON instead of words.")] = False,
-) -> None:
-    """Turn another program's recording into a session that this one plays."""
-    from cockpit.convert import run_convert
-
-    run_convert(recording, site, out, dbc, map_, json_)
-
-
-@app.command()
-def export(
-    session: Annotated[Path, typer.Argument(help="Session: a file or a folder of files.")],
-    format_: Annotated[str, typer.Option("--format", help="csv, parquet or ros2.")],
-    out: Annotated[Path, typer.Option(help="The folder to write.")],
-    site: Annotated[
-        str | None, typer.Option(help="Site, where the session does not hold its own.")
-    ] = None,
-    source: Annotated[
-        str,
-        typer.Option(
-            help="Tables of what was recorded, or of what is evaluated now; the default "
-            "is recorded where there are snapshots."
-        ),
-    ] = "",
-    json_: Annotated[bool, typer.Option("--json", help="Print JSON instead of words.")] = False,
-) -> None:
-    """Write a session as tables of poses, clearances and alarms, or as a ROS 2 recording."""
-    from cockpit.export import run_export
-
-    run_export(session, format_, out, site, source, json_)
-
-
-@app.command()
 def schema(
     name: Annotated[
         str, typer.Argument(help="Document's name; without it the names are listed.")
@@ -263,6 +219,8 @@ def recover(
 
 
 app.add_typer(recordings, name="recordings")
+app.command()(convert)
+app.command()(export)
 
 
 def _interrupted() -> threading.Event:

@@ -62,3 +62,22 @@ def add_commands(app: typer.Typer, interrupted: Callable[[], Event]) -> None:
         from cockpit.diff import run_diff
 
         run_diff(path, site, json_)
+
+    @app.command()
+    def report(
+        path: Annotated[Path, typer.Argument(help="Session (.mcap) or a folder of its parts.")],
+        out: Annotated[Path, typer.Option(help="The .html file to write.")],
+        site: Seen = None,
+        source: Annotated[
+            str, typer.Option(help="recorded or evaluated; default: recorded where it was.")
+        ] = "",
+        with_diff: Annotated[
+            bool, typer.Option("--diff", help="Also what this program judges otherwise.")
+        ] = False,
+    ) -> None:
+        """Write what happened in a session: plots, incursions, a 3D replay; one HTML file."""
+        if source and source not in SOURCES:
+            raise InputError(f'--source "{source}" is unknown; allowed are {", ".join(SOURCES)}.')
+        from cockpit.report.make import run_report
+
+        run_report(path, out, site, source, with_diff)

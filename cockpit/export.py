@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import tomllib
+import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -18,8 +18,9 @@ from backend.shell.session.evaluate import evaluate
 from backend.shell.session.export import FORMATS, export_bag, export_tables, recorded_documents
 from backend.shell.session.format import SNAPSHOT
 from backend.shell.session.reader import Session, open_session
-from backend.site.site import Site, load_site, parse_site
+from backend.site.site import Site, load_site
 from cockpit.desk import load_models, make_config
+from cockpit.playback import recorded_site
 
 SOURCES = ("recorded", "evaluated")
 
@@ -59,7 +60,7 @@ def export(
         used = "recorded"
     else:
         used = source or ("recorded" if SNAPSHOT in session.topics else "evaluated")
-        site = site_of(session, site_name)
+        site = load_site(site_name) if site_name else recorded_site(session)
         if used == "recorded":
             if SNAPSHOT not in session.topics:
                 raise InputError(
@@ -81,16 +82,13 @@ def export(
     )
 
 
-def site_of(session: Session, name: str | None) -> Site:
-    """The site of that name, else the one that was recorded with the session."""
-    if name is not None:
-        return load_site(name)
-    if not session.headers:
-        raise InputError(
-            f"{session.path}: is another program's recording; allowed is --site to say where it is."
-        )
-    header = session.headers[0]
-    return parse_site(tomllib.loads(header.site), Path(header.site_file))
+def export_zip(path: Path, kind: str, out: Path, site_name: str | None, source: str) -> Path:
+    """The same as one .zip file in the folder `out`, for a browser. Raises InputError."""
+    folder = out / f"{path.stem}-{kind}"
+    export(path, kind, folder, site_name, source)
+    archive = shutil.make_archive(str(folder), "zip", root_dir=out, base_dir=folder.name)
+    shutil.rmtree(folder)
+    return Path(archive)
 
 
 def _evaluated(

@@ -29,7 +29,7 @@ from backend.shell.app.session_api import session_router
 from backend.shell.app.viewer_proxy import Hooks, viewer_router
 from backend.shell.hub import Hub
 from backend.shell.image_loops import ImageLoops
-from backend.shell.session.cycles import Topics, problems
+from backend.shell.session.cycles import Topics
 from backend.shell.session.index import Index
 from backend.shell.session.player import MODE, Player
 from backend.shell.session.reader import Session, open_session
@@ -37,17 +37,22 @@ from backend.shell.session.ring import parts_of, pins_of, recordings_of
 from backend.site.site import Site, load_site, parse_site, shipped_sites
 from cockpit.desk import LOOPBACK, Desk, image_loops, load_models, make_config
 from cockpit.resolutions import resolutions
+from cockpit.session_document import session_document
+from cockpit.session_files import session_file
 from cockpit.views.inputs import scene_site
 from cockpit.views.server import HEAD, View, start
 
 
 @dataclass(frozen=True)
 class Seen:
-    """A session as seen on a site, with all that judging it needs."""
+    """A session as seen on a site, with all that judging it needs. chosen_site: when it is not
+    the one in the recording.
+    """
 
     session: Session
     site: Site
     config: Config
+    chosen_site: str | None = None
 
     @property
     def topics(self) -> Topics:
@@ -77,7 +82,7 @@ def see(path: Path, site_name: str | None, mode: str = MODE) -> Seen:
         for name in (session.headers[0].own.split(",") if session.headers else ())
         if name in known
     )
-    return Seen(session, site, make_config(site, models, own, mode))
+    return Seen(session, site, make_config(site, models, own, mode), site_name)
 
 
 def recorded_site(session: Session) -> Site:
@@ -221,34 +226,11 @@ class PlaybackStation:
 
     def session(self) -> dict[str, Any]:
         """What backend.documents.session.SessionDocument describes."""
-        session, seen = self.seen.session, self.seen
-        header = session.headers[0] if session.headers else None
-        begin = session.begin
-        found = [*session.notes, *problems(session, seen.topics), *self.index.problems()]
-        return {
-            "title": session.title,
-            "begin": begin / 1e9,
-            "duration": (session.end - begin) / 1e9,
-            "machines": list(self.config.machines),
-            "origin": header.origin if header else "other",
-            "note": header.note if header else "",
-            "parts": [
-                {
-                    "name": part.path.name,
-                    "begin": (part.begin - begin) / 1e9,
-                    "end": (part.end - begin) / 1e9,
-                }
-                for part in session.parts
-            ],
-            "topics": {
-                topic: {"type": info.type, "count": info.count}
-                for topic, info in session.topics.items()
-            },
-            "problems": list(dict.fromkeys(found)),
-            "sources": list(self.player.sources),
-            "index": self.index.state,
-            "events": self.index.events(),
-        }
+        document = session_document(
+            self.seen, self.player.sources, self.index.state, self.index.events()
+        )
+        document["problems"] = list(dict.fromkeys([*document["problems"], *self.index.problems()]))
+        return document
 
     def series(
         self, source: str | None, start: float, end: float | None, points: int
@@ -265,6 +247,10 @@ class PlaybackStation:
 
     def diff(self) -> dict[str, Any]:
         return self.index.diff()
+
+    def file(self, kind: str) -> Path:
+        """The report ("report") or an export of the session. Raises InputError."""
+        return session_file(self.seen.session.path, self.seen.chosen_site, kind)
 
     def _on_message(self, message: dict[str, Any]) -> None:
         """What a page asks of playback or of the scene. Anything else, commands included, ends

@@ -19,7 +19,7 @@ import numpy as np
 
 from backend.machine.kinematics import link_poses
 from backend.machine.model import PARTS, Machine
-from backend.spatial import transform
+from backend.spatial import rotation, transform
 from backend.spatial.boxes import Boxes
 from backend.spatial.types import Array, BoolArray, IntArray
 
@@ -78,6 +78,11 @@ class PlanarArm:
     def pivots(self) -> Array:
         """(3, 2) pivots of boom, stick and bucket at joint values 0 [m]."""
         return np.cumsum([self.pivot, self.boom, self.stick], axis=0)
+
+    def T_arm_root(self, swing: Array) -> Array:
+        """(..., 4, 4) of the frame that has turned with the swing joint. swing: (...) [rad]."""
+        turn = transform.make(rotation.rz(self.swing_sign * np.asarray(swing)), np.zeros(3))
+        return transform.inverse(self.T_root_arm @ turn)
 
 
 def planar_arm(machine: Machine, rest: Array | None = None, inflation: float = 0.0) -> PlanarArm:

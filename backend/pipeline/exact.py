@@ -13,7 +13,7 @@ import numpy as np
 
 from backend.cspace.cells import COLLIDING, FREE, CellModels, cell_models, coded
 from backend.cspace.exact import JointGrid
-from backend.cspace.joint_bars import joint_bar
+from backend.cspace.joint_bars import joint_bars
 from backend.cspace.reach_image import ReachImage, reach_image
 from backend.cspace.regions import cell_of
 from backend.fusion.inflation import joint_slack
@@ -126,6 +126,7 @@ def own_image(
     edges = joint_edges(machine, q)
     around = _Around(models, layers, concatenated(layers.values()))
     volume = _cells(around, edges, q, dict.fromkeys((1, 2, 3), cells.volume))
+    bars = joint_bars(machine, q, dict(enumerate(edges)), cells.bar, layers, models.eta, slack)
     return OwnImage(
         own=own,
         partners=tuple(name for name in snapshot.machines if name != own),
@@ -133,14 +134,7 @@ def own_image(
         eta=models.eta,
         q=q,
         slices=tuple(_slice(around, edges, q, plane, cells.slice) for plane in PLANES),
-        bars=tuple(
-            Bar(
-                role,
-                edges[k],
-                joint_bar(machine, q, k, edges[k], cells.bar, layers, models.eta, slack),
-            )
-            for k, role in enumerate(ARM)
-        ),
+        bars=tuple(Bar(role, edges[k], bars[k]) for k, role in enumerate(ARM)),
         volume=volume[0],
         volume_edges=edges[1:],
         reach=reach_image(machine, q, layers, cells.reach, tip_height),

@@ -4,36 +4,27 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import ConfigDict, Field, field_validator, model_validator
 
 from backend.machine.model import ROLES
+from backend.site.base import (
+    Degrees,
+    MachineName,
+    Matrix,
+    Name,
+    NotNegative,
+    Positive,
+    Prefix,
+    Table,
+    Tilt,
+    Vector,
+)
+from backend.site.others import Can, MachineTopics, refuse_shared_topics
 from backend.spatial.rotation import rz
 from backend.spatial.types import Array, frozen
-
-Vector: TypeAlias = tuple[float, float, float]
-Matrix: TypeAlias = tuple[Vector, Vector, Vector]
-Degrees: TypeAlias = Annotated[float, Field(ge=-360.0, le=360.0)]
-Tilt: TypeAlias = Annotated[float, Field(ge=-45.0, le=45.0)]
-Positive: TypeAlias = Annotated[float, Field(gt=0.0)]
-NotNegative: TypeAlias = Annotated[float, Field(ge=0.0)]
-Name: TypeAlias = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+$", max_length=64)]
-MachineName: TypeAlias = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$", max_length=32)]
-Prefix: TypeAlias = Annotated[
-    str, Field(pattern=r"^[A-Za-z0-9_-]+(/[A-Za-z0-9_-]+)*$", max_length=128)
-]
-
-RosTopic: TypeAlias = Annotated[
-    str, Field(pattern=r"^/[A-Za-z0-9_-]+(/[A-Za-z0-9_-]+)*$", max_length=256)
-]
-
-
-class Table(BaseModel):
-    """One table: unknown fields, wrong types, NaN and infinities are refused."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
 
 class Frame(Table):
@@ -120,34 +111,6 @@ class MachineSim(Table):
         return dict(self.model_extra or {})
 
 
-class MachineTopics(Table):
-    """ROS 2 topics that one machine's streams have in other people's recordings.
-
-    A stream that is not named is looked for under its own key, "/left/joint_states"; imu: by link
-    ("base", "boom"). One topic may serve two streams of one machine, as an INS's orientation does.
-    """
-
-    joint_states: RosTopic | None = None
-    gnss_fix: RosTopic | None = None
-    gnss_heading: RosTopic | None = None
-    gnss_projected: RosTopic | None = None
-    points: RosTopic | None = None
-    imu: dict[Name, RosTopic] = Field(default_factory=dict)
-
-    @property
-    def streams(self) -> dict[str, str]:
-        """Topic by stream: "joint_states", "gnss/fix", "imu/base", ..."""
-        named = {
-            "joint_states": self.joint_states,
-            "gnss/fix": self.gnss_fix,
-            "gnss/heading": self.gnss_heading,
-            "gnss/projected": self.gnss_projected,
-            "points": self.points,
-        }
-        imus = {f"imu/{link}": topic for link, topic in self.imu.items()}
-        return {stream: topic for stream, topic in named.items() if topic} | imus
-
-
 class SiteMachine(Table):
     """One machine of the site. Paths are relative to the site file's folder."""
 
@@ -224,12 +187,6 @@ class ObstacleMesh(Table):
     max_excess: Annotated[float, Field(gt=0.0, le=5.0)] = 0.15
 
 
-class Can(Table):
-    """CAN logs. map: which signal is what, a path seen from the site file; see scenes/can."""
-
-    map: Annotated[str, Field(min_length=1)] | None = None
-
-
 class Link(Table):
     """Zenoh endpoints, for example "tcp/127.0.0.1:7447"."""
 
@@ -271,7 +228,7 @@ class SiteTable(Table):
         _refuse_duplicates("machine", "name", [machine.name for machine in self.machine])
         obstacles = [o.name for o in self.obstacle] + [m.name for m in self.obstacle_mesh]
         _refuse_duplicates("obstacle", "name", obstacles)
-        _refuse_shared_topics(self.machine)
+        refuse_shared_topics((machine.name, machine.topics) for machine in self.machine)
         prefixes = sorted(machine.prefix + "/" for machine in self.machine)
         for shorter, longer in pairwise(prefixes):
             if longer.startswith(shorter):
@@ -292,16 +249,3 @@ def _refuse_duplicates(table: str, field: str, names: list[str]) -> None:
     for name in names:
         if names.count(name) > 1:
             raise ValueError(f'{table} has the {field} "{name}" twice; allowed is a unique {field}')
-
-
-def _refuse_shared_topics(machines: tuple[SiteMachine, ...]) -> None:
-    """A topic carries one machine's data."""
-    owners: dict[str, str] = {}
-    for machine in machines:
-        for topic in machine.topics.streams.values():
-            owner = owners.setdefault(topic, machine.name)
-            if owner != machine.name:
-                raise ValueError(
-                    f'machine has the topic "{topic}" for "{owner}" and for "{machine.name}"; '
-                    "allowed is one machine a topic"
-                )

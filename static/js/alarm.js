@@ -29,7 +29,7 @@ function judge() {
   const state_ = link();
   if (!s) return { level: "NONE", line: state_ === "connecting" ? "Connecting to the backend" : "Waiting for data", detail: "", key: "none" };
   if (state_ === "lost") {
-    const detail = replaying() ? "The player does not answer. Nothing here moves on. Reconnecting." : "Nothing on this page is current. Clearance unknown. Reconnecting.";
+    const detail = replaying() ? "The player does not answer, or is still at work on what was asked. Nothing here moves on." : "Nothing on this page is current. Clearance unknown. Reconnecting.";
     return { level: "UNKNOWN", line: `LINK LOST · last data ${seconds(silence())} ago`, detail, key: "lost" };
   }
   const [first, ...more] = alarms();

@@ -8,7 +8,8 @@ async function failed(reply) {
   } catch {
     // not JSON: the status has to do
   }
-  return new Error(detail || (reply.status === 404 ? "this server cannot do that" : `the server answered ${reply.status}`));
+  if (reply.status === 404 && (!detail || detail === "Not Found")) return new Error("this server cannot do that");
+  return new Error(detail || `the server answered ${reply.status}`);
 }
 
 async function request(path, options) {

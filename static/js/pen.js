@@ -94,7 +94,7 @@ export function playbackMark(g, box) {
   g.textAlign = "center";
   g.textBaseline = "middle";
   g.lineWidth = 1.6 / k;
-  g.strokeStyle = rgba(C.playback, 0.42);
+  g.strokeStyle = rgba(C.playbackLine, 0.4);
   g.strokeText("PLAYBACK", 0, 0);
   g.restore();
 }

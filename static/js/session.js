@@ -128,4 +128,5 @@ export function reconnected() {
 export const problems = () => [...(session.problem ? [session.problem] : []), ...(session.document?.problems ?? [])];
 export const note = () => playback()?.note || session.document?.note || "";
 export const title = () => playback()?.title || session.document?.title || state.site?.title || "";
-export const events = () => session.document?.events ?? [];
+const NONE = [];
+export const events = () => session.document?.events ?? NONE;

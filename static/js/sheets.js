@@ -58,7 +58,7 @@ function sessionSheet() {
   return [
     heading("Session"),
     make("dl", {}, ...rows.flatMap(([name, text]) => [make("dt", { text: name }), make("dd", { text })])),
-    make("h4", { text: bad.length ? "What could not be read" : "Everything could be read." }),
+    make("h4", { text: bad.length ? "What could not be read or shown" : "Everything could be read." }),
     ...(bad.length ? [make("ul", {}, ...bad.slice(0, 12).map((text) => make("li", { class: "problem", text })), ...(bad.length > 12 ? [make("li", { text: `and ${bad.length - 12} more` })] : []))] : []),
   ];
 }

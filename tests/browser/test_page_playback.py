@@ -154,6 +154,7 @@ def test_playback_fits_and_says_so(
     where = f"playback-{size[0]}x{size[1]}"
     feed.page.screenshot(path=artifacts / f"{where}.png")
     feed.player.time = 246.0
+    feed.player.loop = [230.0, 262.0]
     feed.page.keyboard.press("Space")
     feed.page.click("#t-session")
     stop = {**LOW, "level": "STOP", "line": "STOP · LEFT bucket ↔ RIGHT boom · 0.08 m"}
@@ -315,7 +316,7 @@ def test_the_source_is_switched_and_said(feed: PlaybackFeed) -> None:
         lambda: (
             feed.player.source == "evaluated"
             and "judged now" in feed.page.inner_text("#watermark-what")
-            and feed.shown("trends")["sources"] == ["evaluated"]
+            and feed.shown("trends").get("sources") == ["evaluated"]
         )
     )
     feed.player.changes = {"sources": ["recorded"], "source": "recorded"}
@@ -330,7 +331,9 @@ def test_series_follow_the_cursor_and_seek(feed: PlaybackFeed, artifacts: Path) 
     assert shown["window"] == [0, DURATION]
     assert shown["least"] == pytest.approx(0.08, abs=0.05)
     assert set(shown["levels"]) == {"CLEAR", "SLOW", "STOP", "UNKNOWN"}
-    feed.send(lambda: feed.shown("trends")["cursor"] == pytest.approx(feed.player.time, abs=0.7))
+    feed.send(
+        lambda: feed.shown("trends").get("cursor") == pytest.approx(feed.player.time, abs=0.7)
+    )
     feed.page.mouse.click(*feed.at("trends", 0.3, 0.5))
     feed.send(lambda: bool(feed.said("seek")))
     aimed = feed.said("seek")[-1]["value"]
@@ -340,7 +343,7 @@ def test_series_follow_the_cursor_and_seek(feed: PlaybackFeed, artifacts: Path) 
     feed.send(lambda: "as it was: " in feed.page.inner_text("#hover"))
     assert " m, LEFT " in feed.page.inner_text("#hover")
     feed.page.click("#trends-what")
-    feed.send(lambda: feed.shown("trends")["right"] == "angles")
+    feed.send(lambda: feed.shown("trends").get("right") == "angles")
     feed.page.mouse.move(*feed.at("trends", 0.75, 0.5))
     feed.send(lambda: "boom" in feed.page.inner_text("#hover"))
     feed.page.screenshot(path=artifacts / "playback-angles-1920x1080.png")
@@ -360,7 +363,7 @@ def test_series_follow_the_cursor_and_seek(feed: PlaybackFeed, artifacts: Path) 
 def test_comparing_shows_progress_then_a_table_that_jumps(
     feed: PlaybackFeed, artifacts: Path
 ) -> None:
-    assert feed.shown("trends")["sources"] == ["recorded"]
+    assert feed.shown("trends").get("sources") == ["recorded"]
     feed.page.click("#t-compare")
     feed.page.click("#diff-start")
     sheet = feed.page.locator("#sheet-compare")
@@ -370,7 +373,7 @@ def test_comparing_shows_progress_then_a_table_that_jumps(
     text = sheet.inner_text()
     for words in ("LEFT ↔ RIGHT", "42 mm", "4:06.3", "1.4 s earlier", "never", "1 stretch"):
         assert words in text, words
-    feed.send(lambda: feed.shown("trends")["sources"] == ["recorded", "evaluated"])
+    feed.send(lambda: feed.shown("trends").get("sources") == ["recorded", "evaluated"])
     feed.page.screenshot(path=artifacts / "playback-compare-1920x1080.png")
     whole(feed, (1920, 1080))
     feed.page.click("#sheet-compare td button >> text=1:58.6")
@@ -464,6 +467,17 @@ def test_ages_of_recorded_streams_are_as_recorded(feed: PlaybackFeed) -> None:
         ),
         machines=machines,
     )
+
+
+def test_sound_that_was_on_is_off_in_playback(feed: PlaybackFeed) -> None:
+    said = feed.page.locator("#sound")
+    feed.send(lambda: feed.page.inner_text("#mode") == "LIVE", mode="LIVE")
+    assert feed.page.is_hidden("#transport")
+    assert feed.page.is_hidden("#watermark")
+    feed.page.keyboard.press("m")
+    feed.send(lambda: "SOUND ON" in said.inner_text(), mode="LIVE")
+    feed.send(lambda: "SOUND OFF" in said.inner_text() and "in playback" in said.inner_text())
+    assert feed.page.get_attribute("body", "data-sound") == "off"
 
 
 def test_no_key_or_click_reaches_anything_but_the_player(feed: PlaybackFeed) -> None:

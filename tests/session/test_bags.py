@@ -16,7 +16,7 @@ from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, W
 from rosbags.typesys import Stores, get_typestore
 
 from backend.shell.link.codec import decode
-from backend.shell.session.convert import convert
+from backend.shell.session.convert import convert, needs_conversion
 from backend.shell.session.format import METADATA, Header
 from backend.site.site import load_site
 
@@ -136,11 +136,40 @@ def test_single_files_and_folders_without_metadata(tmp_path: Path, storage: Stor
     assert any("metadata.yaml" in problem.text for problem in folder.problems)
 
 
+def test_what_a_player_must_convert_first(tmp_path: Path, repository: Path) -> None:
+    scenes = repository / "scenes"
+    for storage in STORAGES:
+        bag = write_bag(tmp_path / storage.name, messages("/left", 1), storage)
+        (file,) = (f for f in bag.iterdir() if f.suffix != ".yaml")
+        sqlite = storage is StoragePlugin.SQLITE3
+        assert needs_conversion(bag) is needs_conversion(file) is sqlite
+    assert needs_conversion(scenes / "can" / "sun2020-appendix-a.asc")
+    assert not needs_conversion(scenes / "sessions" / "sun2020-experiment.mcap")
+    assert not needs_conversion(tmp_path / "nowhere.csv")
+    assert not needs_conversion(scenes)
+
+
 @pytest.mark.parametrize("mode", [CompressionMode.FILE, CompressionMode.MESSAGE])
 def test_compressed_bags(tmp_path: Path, mode: CompressionMode) -> None:
     bag = write_bag(tmp_path / "bag", messages("/left"), compression=mode)
     done = convert(bag, load_site("demo"), tmp_path / "out.mcap")
     assert done.messages == 35
+
+
+def test_clouds_of_points_pass_as_they_are(tmp_path: Path) -> None:
+    field = T["sensor_msgs/msg/PointField"]("x", 0, 7, 1)
+    content: list[tuple[str, int, Any]] = []
+    for k in range(3):
+        data = np.arange(4000, dtype=np.uint8)
+        cloud = T["sensor_msgs/msg/PointCloud2"](
+            header(START), 1, 1000, [field], False, 4, 4000, data, True
+        )
+        content.append(("/left/points", START + k, cloud))
+    done = convert(write_bag(tmp_path / "bag", content), load_site("demo"), tmp_path / "o.mcap")
+    _, found = read(done.out)
+    assert [data for _, _, data in found] == [
+        bytes(ROS.serialize_cdr(m, m.__msgtype__)) for _, _, m in content
+    ]
 
 
 def test_topics_by_the_site_file(tmp_path: Path, repository: Path) -> None:

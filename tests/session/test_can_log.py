@@ -146,6 +146,24 @@ def test_any_dbc_with_units_factors_and_the_machines_own_angles(tmp_path: Path) 
     assert len(done.skipped) == 1
 
 
+def test_floats_that_are_no_numbers_are_told(tmp_path: Path) -> None:
+    (tmp_path / "f.dbc").write_text(
+        'VERSION ""\nNS_ :\nBS_:\nBU_: X\n'
+        'BO_ 7 Swing: 4 X\n SG_ angle : 0|32@1- (1,0) [0|0] "rad" X\n'
+        "SIG_VALTYPE_ 7 angle : 1;\n"
+    )
+    (tmp_path / "f.toml").write_text(
+        'dbc = "f.dbc"\n[[machine]]\nname = "a"\n'
+        'joints.swing = { signal = "Swing.angle", unit = "rad" }\n'
+    )
+    frames = [frame(1.0 + k, 7, struct.pack("<f", v)) for k, v in enumerate([0.5, np.nan, 0.6])]
+    log = write(tmp_path / "f.blf", frames)
+    done = convert(log, load_site(SITE), tmp_path / "o.mcap", can_map=tmp_path / "f.toml")
+    assert done.counts["/a/joint_states"] == 2
+    (problem,) = done.problems
+    assert "7 Swing.angle = nan is kept out: not a number" in problem.text
+
+
 def test_a_step_costs_one_value_and_an_outlier_is_one_value() -> None:
     gate = Gate(10.0)
     values = [0.0, 0.01, 1.0, 0.02, 2.0, 2.01, 2.02, -0.5, 2.03]
@@ -186,6 +204,22 @@ def test_a_clock_that_goes_back_goes_on_in_the_session(tmp_path: Path) -> None:
     assert "frame 10" in problem.where
     stamps = [s.stamp for _, _, _, s in samples(done.out)]
     assert np.diff(stamps) == pytest.approx([0.02, 0.02, 0.0, 0.02, 0.02], abs=1e-6)
+
+
+def test_times_that_are_none(tmp_path: Path) -> None:
+    row = "{t},0x193,0,0,0,2,ARA="
+    text = "timestamp,arbitration_id,extended,remote,error,dlc,data\n"
+    for t in ("-5.0", "nan", "1.0", "inf", "2.0"):
+        for identifier in (402, 404, 406):
+            text += row.format(t=t).replace("0x193", hex(identifier)) + "\n"
+    (tmp_path / "l.csv").write_text(text)
+    done = convert(tmp_path / "l.csv", load_site(SITE), tmp_path / "o.mcap")
+    assert (done.begin, done.end) == (0, 2_000_000_000)
+    assert done.counts["/a/joint_states"] == 3
+    assert {p.text: p.count for p in done.problems} == {
+        "times before 1970 count as its beginning": 3,
+        "frames without a time are left out": 6,
+    }
 
 
 @pytest.mark.parametrize("keep", [0.001, 0.02, 0.5, 0.9])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from backend.shell.session.format import ALARM, SNAPSHOT, Header, Message, dumps
 from backend.shell.session.sun2020 import NAME
 from backend.shell.session.writer import SessionWriter
 from backend.site.site import load_site
+from cockpit.export import export_zip
 
 
 @pytest.fixture(scope="module")
@@ -197,6 +199,14 @@ def test_a_ros2_export_converts_back_to_the_same_messages(session: Path, tmp_pat
     done = cockpit("convert", str(tmp_path / "bag"), *more)
     assert json.loads(done.stdout)["messages"] == 2527  # the marker is ours and stays behind
     assert json.loads(done.stdout)["problems"] == []
+
+
+def test_one_file_for_a_browser(session: Path, tmp_path: Path) -> None:
+    archive = export_zip(session, "ros2", tmp_path, None, "")
+    assert [file.name for file in tmp_path.iterdir()] == [archive.name]
+    with zipfile.ZipFile(archive) as file:
+        names = {Path(name).name for name in file.namelist() if not name.endswith("/")}
+    assert names == {"metadata.yaml", f"{NAME}-ros2.mcap"}
 
 
 def test_snapshots_of_strangers_are_left_out(tmp_path: Path) -> None:

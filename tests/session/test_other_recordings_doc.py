@@ -10,7 +10,7 @@ from backend.shell.session.can_log import SUFFIXES as CAN_SUFFIXES
 from backend.shell.session.export import FORMATS
 from backend.shell.session.export_rows import POSES, TABLES
 from backend.shell.session.pose_columns import COLUMNS, MACHINE, TIMES, VALIDITY
-from backend.site.tables import MachineTopics
+from backend.site.others import MachineTopics
 
 
 def test_every_column_is_described(repository: Path) -> None:

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Protocol
+import shutil
+from pathlib import Path
+from typing import Annotated, Any, Literal, Protocol
 
 from fastapi import APIRouter, Query, Response
+from fastapi.responses import FileResponse
+from starlette.background import BackgroundTask
 
 from backend.documents.session import DiffDocument, SeriesDocument, SessionDocument, Source
+from backend.errors import InputError
 from backend.shell.app.wire import dumps
 
 MOST_POINTS = 20_000
@@ -25,6 +30,9 @@ class Playback(Protocol):
     def start_diff(self) -> None: ...
 
     def diff(self) -> dict[str, Any]: ...
+
+    def file(self, kind: str) -> Path:
+        """The report, or an export, in a folder of its own. Raises InputError."""
 
 
 def session_router(playback: Playback) -> APIRouter:
@@ -61,7 +69,31 @@ def session_router(playback: Playback) -> APIRouter:
         """As it was against as this program judges it."""
         return _json(playback.diff())
 
+    @router.post("/report", response_class=FileResponse)
+    def report() -> Response:
+        """What happened, plots, incursions, a 3D replay: one HTML file that needs nothing else."""
+        return _file(playback, "report", "text/html")
+
+    @router.post("/export", response_class=FileResponse)
+    def export(
+        kind: Annotated[
+            Literal["csv", "parquet", "ros2"],
+            Query(alias="format", description="tables, or messages only"),
+        ],
+    ) -> Response:
+        """The session as tables or as a plain ROS 2 recording, in one .zip file."""
+        return _file(playback, kind, "application/zip")
+
     return router
+
+
+def _file(playback: Playback, kind: str, media: str) -> Response:
+    try:
+        path = playback.file(kind)
+    except InputError as error:
+        return _json({"detail": str(error)}, 422)
+    gone = BackgroundTask(shutil.rmtree, path.parent, ignore_errors=True)
+    return FileResponse(path, media_type=media, filename=path.name, background=gone)
 
 
 def _json(document: Any, status: int = 200) -> Response:

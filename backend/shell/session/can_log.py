@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import suppress
@@ -105,6 +106,9 @@ def _messages(
             skipped[_id(*identifier)] = unknown[identifier]
             continue
         known += 1
+        if not math.isfinite(frame.timestamp):
+            problems.add(where, "frames without a time are left out")
+            continue
         time = clock.place(round(frame.timestamp * 1e9), where)
         try:
             values = wanted[0].message.decode(bytes(frame.data), decode_choices=False)
@@ -119,7 +123,8 @@ def _messages(
             taken, messages = target.streams.update(time, target.name, value)
             if not taken:
                 signal = f"{target.message.name}.{target.signal}"
-                text = f"{frame.arbitration_id} {signal} = {value:g} is kept out: an outlier"
+                why = "an outlier" if math.isfinite(value) else "not a number"
+                text = f"{frame.arbitration_id} {signal} = {value:g} is kept out: {why}"
                 problems.add(f"{where}, {time / 1e9:.3f} s", text, kind=f"outlier {signal}")
                 events.append(Event(time, target.machine, text))
             yield from messages

@@ -12,9 +12,9 @@ from pydantic import Field, ValidationError, field_validator, model_validator
 
 from backend.errors import InputError
 from backend.machine.model import ROLES
+from backend.site.base import MachineName, Positive, Table
 from backend.site.messages import sentence
 from backend.site.site import Site
-from backend.site.tables import MachineName, Positive, Table
 
 CAN = Path(__file__).resolve().parents[3] / "scenes" / "can"
 

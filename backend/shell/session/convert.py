@@ -90,6 +90,15 @@ def convert(
     )
 
 
+def needs_conversion(path: Path) -> bool:
+    """Whether `path` is something that `convert` reads and the session reader does not."""
+    if path.is_dir():
+        return bags.is_bag(path) and not any(path.glob("*.mcap"))
+    if path.suffix == ".mcap" or not path.is_file():
+        return False
+    return bags.is_bag(path) or can_log.is_can_log(path) or pose_tables.is_table(path)
+
+
 def open_source(
     path: Path,
     site: Site,

@@ -58,10 +58,9 @@ class Index:
         self._session = session
         self.sources = sources(session, topics)
         self._known: dict[str, Known] = {}
-        work = {"recorded": _index_recorded, "evaluated": _index_evaluated}
         arguments = (session.path, topics, config)
         self._jobs = {
-            source: Job(work[source], *arguments, part=partial(self._take, source))
+            source: Job(_WORK[source], *arguments, part=partial(self._take, source))
             for source in self.sources
         }
         self._diff = Job(_diff, *arguments)
@@ -120,6 +119,13 @@ class Index:
 
     def _take(self, source: str, known: Known) -> None:
         self._known[source] = known
+
+
+def known_of(
+    source: str, session: Session, topics: Topics, config: Config, tell: Tell = lambda *_: None
+) -> Known:
+    """Events and series of a whole session, here and now. tell: of progress, 0 to 1."""
+    return _WORK[source](tell, session.path, topics, config)
 
 
 class _Milestones:
@@ -230,3 +236,6 @@ def _known(
     ]
     events = ordered([*alarms.close(session.end), *others])
     return Known(tuple(events), series, (*session.notes, *refused))
+
+
+_WORK = {"recorded": _index_recorded, "evaluated": _index_evaluated}

@@ -86,7 +86,9 @@ class SteadyClock:
         self._shift = 0
 
     def place(self, time: int, where: str) -> int:
-        placed = time + self._shift
+        if time < 0:
+            self._problems.add(where, "times before 1970 count as its beginning")
+        placed = max(time, 0) + self._shift
         if self._last is not None and placed < self._last:
             back = self._last - placed
             if back > _JUMP:

@@ -174,6 +174,15 @@ class RecordedTrack:
             return None
 
 
+def recorded(session: Session, config: Config) -> Iterator[tuple[int, Snapshot]]:
+    """(time [ns], snapshot) of all that was recorded; what cannot be read is left out and noted."""
+    for message in session.messages(topics=[SNAPSHOT]):
+        try:
+            yield message.time, recorded_snapshot(document(message.data), config)
+        except (ValueError, NotASnapshot):
+            session.note("some recorded snapshots cannot be read and are left out")
+
+
 def sources(session: Session, topics: Topics) -> tuple[str, ...]:
     """The ways in which a session can be seen: "recorded", "evaluated"."""
     found = []

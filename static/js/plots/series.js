@@ -82,7 +82,7 @@ function drawClearance(g, chart, drawn) {
   thresholds(g, chart, [[slow, `slow ${number(slow, 1)}`], [stop, `stop ${number(stop, 1)}`]]);
   drawn.forEach(([source, data], i) => {
     const values = clearanceOf(data);
-    if (values) curve(g, chart, points(chart, data.time, values), source === "recorded" ? C.text : C.playback, 2, DASH[source]);
+    if (values) curve(g, chart, points(chart, data.time, values), source === "recorded" ? C.text : C.playbackLine, 2, DASH[source]);
     levels(g, chart, data, chart.box.top + 1 + 9 * i, 8);
   });
 }
@@ -138,7 +138,7 @@ export function paint(g, width, height) {
   const right = choice.angles ? frame(g, place, across, up(-180, 180, [-180, -90, 0, 90, 180]), "", "°", 2.8) : frame(g, place, across, up(0, OLD, [0, 0.1, 0.2, 0.3, 0.4, 0.5], 1), "", "s");
   const entries = choice.angles ? drawAngles(g, right, drawn[0]) : drawAges(g, right, drawn[0]);
   drawClearance(g, left, drawn);
-  title(g, left, [`clearance to ${nameOf(state.partner)}, m`, "clearance, m"], drawn.map(([source]) => [swatches.line(source === "recorded" ? C.text : C.playback, DASH[source]), WORD[source]]));
+  title(g, left, [`clearance to ${nameOf(state.partner)}, m`, "clearance, m"], drawn.map(([source]) => [swatches.line(source === "recorded" ? C.text : C.playbackLine, DASH[source]), WORD[source]]));
   title(g, right, choice.angles ? [`angles of ${nameOf(state.own)}, °`, "angles, °", "°"] : ["joint age, s"], entries);
   for (const chart of charts = [left, right]) needle(g, chart);
   const first = drawn[0][1];

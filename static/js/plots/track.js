@@ -1,6 +1,6 @@
 // The timeline of a recorded session: events, cursor, loop; dragging seeks, dragging with Shift marks a loop.
 
-import { C, rgba, size } from "../theme.js";
+import { C, size } from "../theme.js";
 import { number, scale } from "../axis.js";
 import { clock, tickText, timeTicks, wallClock } from "../clock.js";
 import { clear, label, message, segment } from "../pen.js";
@@ -28,11 +28,13 @@ function ruler(g, map, y, duration) {
 
 function section(g, [a, b], map, top, bottom) {
   const x0 = map(a), x1 = map(b);
-  g.fillStyle = rgba(C.playback, 0.22);
-  g.fillRect(x0, top, x1 - x0, bottom - top);
+  // Bars above and below: a veil would change the colours of the levels.
+  g.fillStyle = C.playbackLine;
+  g.fillRect(x0, top - 3, x1 - x0, 3);
+  g.fillRect(x0, bottom, x1 - x0, 3);
   for (const [x, way] of [[x0, 1], [x1, -1]]) {
-    segment(g, x, top, x, bottom, C.playback, 2);
-    g.fillStyle = C.playback; // handles point inwards
+    segment(g, x, top - 3, x, bottom + 3, C.playbackLine, 2);
+    g.fillStyle = C.playbackLine; // handles point inwards
     g.beginPath();
     g.moveTo(x, top);
     g.lineTo(x + 7 * way, top);
@@ -59,11 +61,41 @@ function needle(g, x, top, bottom, hollow) {
   }
 }
 
-export function paint(g, width, height, dpr) {
+/** What does not move: ruler, intervals, marks. Drawn once into a picture of its own. */
+const still = { key: [], canvas: null, sorted: [], kinds: {} };
+
+function stillPicture(width, height, dpr, duration, map, top, bottom) {
+  const key = [events(), width, height, dpr, duration];
+  if (still.canvas && key.every((value, i) => value === still.key[i])) return still.canvas;
+  if (key[0] !== still.key[0]) {
+    still.sorted = [...events()].sort((a, b) => rank(a) - rank(b));
+    still.kinds = {};
+    for (const { kind } of still.sorted) still.kinds[kind] = (still.kinds[kind] ?? 0) + 1;
+  }
+  const canvas = document.createElement("canvas");
+  canvas.width = Math.round(width * dpr);
+  canvas.height = Math.round(height * dpr);
+  const g = canvas.getContext("2d");
+  g.scale(dpr, dpr);
   clear(g, width, height);
+  g.fillStyle = C.free;
+  g.fillRect(map(0), top, map(duration) - map(0), bottom - top);
+  ruler(g, map, top, duration);
+  for (const e of still.sorted) if (e.end !== null && e.end !== undefined) interval(g, e, map(e.start), map(Math.min(e.end, duration)), top, bottom, dpr);
+  // Of marks that would cover each other, the gravest.
+  const r = Math.min(0.55 * (bottom - top), 0.65 * size("tick"));
+  const places = new Map();
+  for (const e of still.sorted) places.set(Math.round(map(e.start) / (0.9 * r)), e);
+  for (const e of [...places.values()].sort((a, b) => rank(a) - rank(b))) mark(g, e, map(e.start) + 1, (top + bottom) / 2, r);
+  Object.assign(still, { key, canvas });
+  return canvas;
+}
+
+export function paint(g, width, height, dpr) {
   const p = playback();
   if (!p) {
     geometry.map = null;
+    clear(g, width, height);
     message(g, width, height, "waiting for the player");
     return { state: { events: 0 }, age: Infinity, label: "Timeline: waiting for the player" };
   }
@@ -71,19 +103,10 @@ export function paint(g, width, height, dpr) {
   const map = scale(0, Math.max(p.duration, 0.001), 12, width - 12);
   Object.assign(geometry, { map, height });
   const top = Math.round(t) + 2, bottom = height - 4;
-  g.fillStyle = C.free;
-  g.fillRect(map(0), top, map(p.duration) - map(0), bottom - top);
-  ruler(g, map, top, p.duration);
+  g.drawImage(stillPicture(width, height, dpr, p.duration, map, top, bottom), 0, 0, width, height);
   const at = cursor();
-  const shown = [...events()].sort((a, b) => rank(a) - rank(b));
-  for (const e of shown) if (e.end !== null && e.end !== undefined) interval(g, e, map(e.start), map(Math.min(e.end, p.duration)), top, bottom, dpr);
   const part = loop();
   if (part) section(g, part, map, top, bottom);
-  // Of marks that would cover each other, the gravest.
-  const r = Math.min(0.55 * (bottom - top), 0.65 * t);
-  const places = new Map();
-  for (const e of shown) places.set(Math.round(map(e.start) / (0.9 * r)), e);
-  for (const e of [...places.values()].sort((a, b) => rank(a) - rank(b))) mark(g, e, map(e.start) + 1, (top + bottom) / 2, r);
   const [from, to] = shownSpan();
   if (session.span) {
     segment(g, map(from), height - 2, Math.max(map(from) + 3, map(to)), height - 2, C.second, 3); // what the trends show
@@ -98,12 +121,11 @@ export function paint(g, width, height, dpr) {
   }
   return {
     state: {
-      time: at, duration: p.duration, events: shown.length, loop: part ?? null, dragging: dragging(), seeking: seeking(),
-      kinds: Object.fromEntries([...new Set(shown.map((e) => e.kind))].map((kind) => [kind, shown.filter((e) => e.kind === kind).length])),
-      window: [from, to], index: index?.state ?? null,
+      time: at, duration: p.duration, events: still.sorted.length, loop: part ?? null, dragging: dragging(), seeking: seeking(),
+      kinds: still.kinds, window: [from, to], index: index?.state ?? null,
     },
     age: snapshotAge(),
-    label: `Timeline of the session: ${clock(at)} of ${clock(p.duration)}, ${shown.length} events`,
+    label: `Timeline of the session: ${clock(at)} of ${clock(p.duration)}, ${still.sorted.length} events`,
   };
 }
 
