@@ -71,9 +71,9 @@ def playing(path: Path) -> Iterator[Backend]:
         end(process)
 
 
-def order(playing: Backend, action: str, value: Any = None, **shown: Any) -> dict[str, Any]:
+def order(backend: Backend, action: str, value: Any = None, /, **shown: Any) -> dict[str, Any]:
     """Gives an order on a page's websocket; the first snapshot whose playback says `shown`."""
-    with playing.socket() as socket:
+    with backend.socket() as socket:
         socket.send(json.dumps({"type": "playback", "do": action, "value": value}))
         header: dict[str, Any] = {}
         for _, header in frames(socket, 90.0):
