@@ -71,13 +71,15 @@ def playing(path: Path) -> Iterator[Backend]:
         end(process)
 
 
-def order(playing: Backend, action: str, value: Any = None) -> dict[str, Any]:
-    """Gives an order on a page's websocket; the first snapshot in which it shows, or the last."""
-    with playing.socket() as socket:
+def order(backend: Backend, action: str, value: Any = None, /, **shown: Any) -> dict[str, Any]:
+    """Gives an order on a page's websocket; the first snapshot whose playback says `shown`."""
+    with backend.socket() as socket:
         socket.send(json.dumps({"type": "playback", "do": action, "value": value}))
-        found = [header for _, header in frames(socket, 2.0)]
-    assert found
-    return found[-1]
+        header: dict[str, Any] = {}
+        for _, header in frames(socket, 90.0):
+            if all(header["playback"][key] == wanted for key, wanted in shown.items()):
+                return header
+    raise AssertionError(f"{action} {value}: {header.get('playback')}")
 
 
 def test_the_page_says_playback(playing: Backend) -> None:
@@ -93,21 +95,22 @@ def test_the_page_says_playback(playing: Backend) -> None:
 
 
 def test_seek_pause_speed_and_source_are_obeyed(playing: Backend) -> None:
-    order(playing, "pause")
-    snapshot = order(playing, "seek", 5.0)
-    assert snapshot["playback"]["time"] == 5.0
+    order(playing, "pause", playing=False)
+    snapshot = order(playing, "seek", 5.0, time=5.0)
     assert snapshot["playback"]["playing"] is False
     then = snapshot["machines"]["left"]["joints"]
-    later = order(playing, "seek", 8.0)
+    later = order(playing, "seek", 8.0, time=8.0)
     assert later["machines"]["left"]["joints"] != then
-    judged = order(playing, "source", "evaluated")
-    assert judged["playback"]["source"] == "evaluated"
-    again = order(playing, "seek", 5.0)["machines"]["left"]["joints"]
+    judged = order(playing, "source", "evaluated", source="evaluated")
+    assert judged["playback"]["time"] == 8.0
+    again = order(playing, "seek", 5.0, time=5.0)["machines"]["left"]["joints"]
     assert again == pytest.approx(then, abs=0.1)
-    assert order(playing, "speed", 4.0)["playback"]["speed"] == 4.0
-    assert order(playing, "speed", 4000.0)["playback"]["speed"] == 4.0, "not allowed, so ignored"
-    order(playing, "speed", 1.0)
-    order(playing, "source", "recorded")
+    order(playing, "speed", 4.0, speed=4.0)
+    order(playing, "speed", 4000.0)
+    order(playing, "loop", [1.0, 2.0], loop=[1.0, 2.0], speed=4.0)  # 4000 is not allowed
+    order(playing, "loop", None, loop=None)
+    order(playing, "speed", 1.0, speed=1.0)
+    order(playing, "source", "recorded", source="recorded")
 
 
 def test_the_session_and_its_series_are_what_their_schemas_say(playing: Backend) -> None:
@@ -140,11 +143,14 @@ def test_the_diff_runs_beside(playing: Backend) -> None:
 
 
 def test_next_event_is_two_actions_away(playing: Backend) -> None:
-    order(playing, "pause")
+    order(playing, "pause", playing=False)
     events = [e for e in playing.get("/api/session")["events"] if e["kind"] != "action"]
-    order(playing, "seek", 0.0)
-    first = order(playing, "next")["playback"]["time"]
-    assert first == pytest.approx(min(e["start"] for e in events if e["start"] > 0.06), abs=1e-3)
+    order(playing, "seek", 1.0, time=1.0)
+    first = min(e["start"] for e in events if e["start"] > 1.06)
+    with playing.socket() as socket:
+        socket.send(json.dumps({"type": "playback", "do": "next"}))
+        times = (header["playback"]["time"] for _, header in frames(socket, 90.0))
+        assert next(t for t in times if t != 1.0) == pytest.approx(first, abs=1e-3)
 
 
 def test_commands_reach_nobody(playing: Backend) -> None:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
 from collections.abc import Collection, Iterable, Iterator, Mapping
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, field
+from typing import Any, TypeAlias
 
 import msgspec
 
@@ -41,32 +42,48 @@ class Portion:
     cycle: int | None = None
 
 
+Owner: TypeAlias = tuple[str, str]
+"""A machine's name and the suffix below its prefix, such as "gnss/fix"."""
+
+
 @dataclass(frozen=True)
 class Topics:
-    """Which topics are of which machine. machines: key prefix on the wire -> name."""
+    """Which topics are of which machine. machines: key prefix on the wire -> name; named: topics of
+    other programs' recordings that the site file names -> what they are.
+    """
 
     machines: Mapping[str, str]
+    named: Mapping[str, tuple[Owner, ...]] = field(default_factory=dict)
 
     @staticmethod
     def of(site: Site) -> Topics:
-        return Topics({machine.prefix: machine.name for machine in site.machines})
+        named: dict[str, tuple[Owner, ...]] = {}
+        for machine in site.machines:
+            for suffix, topic in machine.topics.streams.items():
+                named[topic] = (*named.get(topic, ()), (machine.name, suffix))
+        return Topics({machine.prefix: machine.name for machine in site.machines}, named)
 
-    def owner(self, topic: str) -> tuple[str, str] | None:
-        """(machine, suffix below its prefix) of a topic; None for those of no machine."""
+    def owners(self, topic: str) -> tuple[Owner, ...]:
+        """What a topic is; empty for those of no machine. An INS may be position and heading."""
+        if topic in self.named:
+            return self.named[topic]
         key = topic.removeprefix("/")
         for prefix, name in self.machines.items():
             if key.startswith(f"{prefix}/"):
-                return name, key[len(prefix) + 1 :]
-        return None
+                return ((name, key[len(prefix) + 1 :]),)
+        return ()
 
-    def fused(self, topics: Collection[str]) -> dict[str, tuple[str, str]]:
-        """Those of `topics` that a pose is made from, each with its machine and suffix."""
+    def fused(self, topics: Collection[str]) -> dict[str, tuple[Owner, ...]]:
+        """Those of `topics` that a pose is made from, and what they are."""
         found = {}
         for topic in topics:
-            owner = self.owner(topic)
-            row = match(owner[1]) if owner else None
-            if owner is not None and row is not None and _for_fusion(row[0]):
-                found[topic] = owner
+            owners = tuple(
+                (name, suffix)
+                for name, suffix in self.owners(topic)
+                if (row := match(suffix)) is not None and _for_fusion(row[0])
+            )
+            if owners:
+                found[topic] = owners
         return found
 
 
@@ -85,10 +102,10 @@ def problems(session: Session, topics: Topics) -> tuple[str, ...]:
     owned: dict[str, list[str]] = {name: [] for name in topics.machines.values()}
     strangers = set()
     for topic in session.topics:
-        owner = topics.owner(topic)
-        if owner is not None:
-            owned[owner[0]].append(owner[1])
-        elif not topic.startswith(OWN):
+        owners = topics.owners(topic)
+        for name, suffix in owners:
+            owned[name].append(suffix)
+        if not owners and not topic.startswith(OWN):
             strangers.add(topic)
     found = []
     if strangers:
@@ -138,15 +155,13 @@ def samples(session: Session, topics: Topics, messages: Iterable[Message]) -> It
     reader = _Reader(session, topics)
     for message in messages:
         try:
-            sample = reader.sample(message)
+            yield from reader.samples(message)
         except DecodeError:
             continue
-        if sample is not None:
-            yield sample
 
 
 class _Reader:
-    """Messages to samples. fused: topic -> machine, suffix."""
+    """Messages to samples. fused: topic -> machines and suffixes."""
 
     def __init__(self, session: Session, topics: Topics) -> None:
         self.session = session
@@ -157,15 +172,21 @@ class _Reader:
     def local(self, time: int) -> float:
         return seconds(time, self._offset)
 
-    def sample(self, message: Message) -> Sample | None:
-        """None for what is not for the fusion. Raises DecodeError."""
+    def samples(self, message: Message) -> list[Sample]:
+        """Empty for what is not for the fusion. Raises DecodeError."""
         if message.topic == CLOCK:
             return self._clock(message)
-        machine, suffix = self.fused[message.topic]
-        found = decode(machine, suffix, message.data, self.local(message.time))
-        return None if isinstance(found, (AgentStatus, Command, TrueState)) else found
+        arrival = self.local(message.time)
+        return [
+            found
+            for machine, suffix in self.fused[message.topic]
+            if not isinstance(
+                found := decode(machine, suffix, message.data, arrival),
+                (AgentStatus, Command, TrueState),
+            )
+        ]
 
-    def _clock(self, message: Message) -> ClockSample | None:
+    def _clock(self, message: Message) -> list[Sample]:
         try:
             trip = document(message.data)
             machine = str(trip["machine"])
@@ -173,11 +194,11 @@ class _Reader:
         except (ValueError, TypeError, KeyError) as error:
             raise DecodeError(f"clock: {error}") from error
         if machine not in self.names:
-            return None
+            return []
         moved = self.local(message.time) - received
         if abs(moved) > SET:
             sent, received = sent + moved, received + moved
-        return ClockSample(machine, sent, remote, received)
+        return [ClockSample(machine, sent, remote, received)]
 
 
 def _recorded(reader: _Reader, messages: Iterator[Message]) -> Iterator[Portion]:
@@ -186,12 +207,8 @@ def _recorded(reader: _Reader, messages: Iterator[Message]) -> Iterator[Portion]
     for message in messages:
         if message.topic != CYCLE:
             # What could not be decoded then cannot be now: the cycle's message counts it.
-            try:
-                sample = reader.sample(message)
-            except DecodeError:
-                continue
-            if sample is not None:
-                heard.append(sample)
+            with contextlib.suppress(DecodeError):
+                heard += reader.samples(message)
             continue
         try:
             cycle = document(message.data)
@@ -242,13 +259,11 @@ def _periodic(
             yield portion()
             due += PERIOD
         try:
-            sample = reader.sample(message)
+            heard += reader.samples(message)
         except DecodeError:
-            machine, suffix = reader.fused.get(message.topic, ("", message.topic))
-            malformed[f"{machine}/{suffix}"] = malformed.get(f"{machine}/{suffix}", 0) + 1
-            continue
-        if sample is not None:
-            heard.append(sample)
+            owners = reader.fused.get(message.topic, (("", message.topic),))
+            key = "/".join(owners[0])
+            malformed[key] = malformed.get(key, 0) + 1
     while due <= last or heard:
         yield portion()
         due += PERIOD
