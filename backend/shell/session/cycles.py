@@ -5,8 +5,9 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Collection, Iterable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeAlias
 
 import msgspec
 
@@ -16,6 +17,7 @@ from backend.shell.link.codec import DecodeError, decode
 from backend.shell.link.messages import AgentStatus, Command, TrueState
 from backend.shell.link.topics import Direction, match
 from backend.shell.session.format import CLOCK, CYCLE, OWN, Message, seconds
+from backend.shell.session.mapping import map_topics
 from backend.shell.session.reader import Session
 from backend.site.site import Site
 
@@ -27,6 +29,9 @@ NEEDED: dict[str, tuple[str, ...]] = {  # for a pose: how the topics' names begi
     "positions": ("gnss/fix", "gnss/projected"),
     "headings": ("gnss/heading",),
 }
+
+Owner: TypeAlias = tuple[str, str]
+"""(machine, suffix of the key below its prefix)."""
 
 
 @dataclass(frozen=True)
@@ -43,30 +48,47 @@ class Portion:
 
 @dataclass(frozen=True)
 class Topics:
-    """Which topics are of which machine. machines: key prefix on the wire -> name."""
+    """Which topics are of which machine. machines: key prefix on the wire -> name.
+
+    named: in other programs' recordings the owners of every topic that is of use, as the site file
+    has it; None in ours. notes: what is not of use there, in words.
+    """
 
     machines: Mapping[str, str]
+    named: Mapping[str, tuple[Owner, ...]] | None = None
+    notes: tuple[str, ...] = ()
 
     @staticmethod
-    def of(site: Site) -> Topics:
-        return Topics({machine.prefix: machine.name for machine in site.machines})
+    def of(site: Site, session: Session | None = None) -> Topics:
+        """session: its topics are looked up in the site file where another program made it."""
+        machines = {machine.prefix: machine.name for machine in site.machines}
+        if session is None or session.headers:
+            return Topics(machines)
+        mapped = map_topics(site, {topic: info.type for topic, info in session.topics.items()})
+        named = {
+            topic: tuple((stream.machine, stream.suffix) for stream in streams)
+            for topic, streams in mapped.streams.items()
+        }
+        return Topics(machines, named, tuple(note.rstrip(".") for note in mapped.unused))
 
-    def owner(self, topic: str) -> tuple[str, str] | None:
-        """(machine, suffix below its prefix) of a topic; None for those of no machine."""
+    def owners(self, topic: str) -> tuple[Owner, ...]:
+        """(machine, suffix below its prefix) of a topic; none for those of no machine."""
+        if self.named is not None:
+            return self.named.get(topic, ())
         key = topic.removeprefix("/")
         for prefix, name in self.machines.items():
             if key.startswith(f"{prefix}/"):
-                return name, key[len(prefix) + 1 :]
-        return None
+                return ((name, key[len(prefix) + 1 :]),)
+        return ()
 
-    def fused(self, topics: Collection[str]) -> dict[str, tuple[str, str]]:
+    def fused(self, topics: Collection[str]) -> dict[str, tuple[Owner, ...]]:
         """Those of `topics` that a pose is made from, each with its machine and suffix."""
         found = {}
         for topic in topics:
-            owner = self.owner(topic)
-            row = match(owner[1]) if owner else None
-            if owner is not None and row is not None and _for_fusion(row[0]):
-                found[topic] = owner
+            rows = [(owner, match(owner[1])) for owner in self.owners(topic)]
+            used = tuple(owner for owner, row in rows if row and _for_fusion(row[0]))
+            if used:
+                found[topic] = used
         return found
 
 
@@ -85,12 +107,12 @@ def problems(session: Session, topics: Topics) -> tuple[str, ...]:
     owned: dict[str, list[str]] = {name: [] for name in topics.machines.values()}
     strangers = set()
     for topic in session.topics:
-        owner = topics.owner(topic)
-        if owner is not None:
-            owned[owner[0]].append(owner[1])
-        elif not topic.startswith(OWN):
+        owners = topics.owners(topic)
+        for machine, suffix in owners:
+            owned[machine].append(suffix)
+        if not owners and not topic.startswith(OWN):
             strangers.add(topic)
-    found = []
+    found = list(topics.notes)
     if strangers:
         shown = ", ".join(sorted(strangers)[:5]) + (" …" if len(strangers) > 5 else "")
         listed = ", ".join(sorted(topics.machines))
@@ -137,16 +159,12 @@ def samples(session: Session, topics: Topics, messages: Iterable[Message]) -> It
     """The samples in some of a session's messages; what cannot be decoded is left out."""
     reader = _Reader(session, topics)
     for message in messages:
-        try:
-            sample = reader.sample(message)
-        except DecodeError:
-            continue
-        if sample is not None:
-            yield sample
+        with suppress(DecodeError):
+            yield from reader.samples(message)
 
 
 class _Reader:
-    """Messages to samples. fused: topic -> machine, suffix."""
+    """Messages to samples. fused: topic -> its owners."""
 
     def __init__(self, session: Session, topics: Topics) -> None:
         self.session = session
@@ -157,13 +175,15 @@ class _Reader:
     def local(self, time: int) -> float:
         return seconds(time, self._offset)
 
-    def sample(self, message: Message) -> Sample | None:
-        """None for what is not for the fusion. Raises DecodeError."""
+    def samples(self, message: Message) -> list[Sample]:
+        """What is for the fusion: one, none, or several of a topic with several owners. Raises
+        DecodeError."""
         if message.topic == CLOCK:
-            return self._clock(message)
-        machine, suffix = self.fused[message.topic]
-        found = decode(machine, suffix, message.data, self.local(message.time))
-        return None if isinstance(found, (AgentStatus, Command, TrueState)) else found
+            trip = self._clock(message)
+            return [] if trip is None else [trip]
+        arrival = self.local(message.time)
+        decoded = (decode(*owner, message.data, arrival) for owner in self.fused[message.topic])
+        return [s for s in decoded if not isinstance(s, (AgentStatus, Command, TrueState))]
 
     def _clock(self, message: Message) -> ClockSample | None:
         try:
@@ -186,12 +206,8 @@ def _recorded(reader: _Reader, messages: Iterator[Message]) -> Iterator[Portion]
     for message in messages:
         if message.topic != CYCLE:
             # What could not be decoded then cannot be now: the cycle's message counts it.
-            try:
-                sample = reader.sample(message)
-            except DecodeError:
-                continue
-            if sample is not None:
-                heard.append(sample)
+            with suppress(DecodeError):
+                heard += reader.samples(message)
             continue
         try:
             cycle = document(message.data)
@@ -242,13 +258,10 @@ def _periodic(
             yield portion()
             due += PERIOD
         try:
-            sample = reader.sample(message)
+            heard += reader.samples(message)
         except DecodeError:
-            machine, suffix = reader.fused.get(message.topic, ("", message.topic))
+            machine, suffix = reader.fused.get(message.topic, (("", message.topic),))[0]
             malformed[f"{machine}/{suffix}"] = malformed.get(f"{machine}/{suffix}", 0) + 1
-            continue
-        if sample is not None:
-            heard.append(sample)
     while due <= last or heard:
         yield portion()
         due += PERIOD
