@@ -96,7 +96,7 @@ def _evaluated(
 ) -> Iterator[tuple[int, dict[str, Any]]]:
     own = tuple(machine.name for machine in site.machines)
     config = make_config(site, load_models(site), own, "PLAYBACK")
-    for portion, snapshot in evaluate(session, Topics.of(site), config, progress=progress):
+    for portion, snapshot in evaluate(session, Topics.of(site, session), config, progress=progress):
         yield portion.time, snapshot_document(snapshot, config)
 
 

@@ -56,7 +56,7 @@ class Seen:
 
     @property
     def topics(self) -> Topics:
-        return Topics.of(self.site)
+        return Topics.of(self.site, self.session)
 
 
 def open_with_progress(path: Path) -> Session:

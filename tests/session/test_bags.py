@@ -17,7 +17,10 @@ from rosbags.typesys import Stores, get_typestore
 
 from backend.shell.link.codec import decode
 from backend.shell.session.convert import convert, needs_conversion
+from backend.shell.session.cycles import Topics, portions
+from backend.shell.session.cycles import problems as problems_of
 from backend.shell.session.format import METADATA, Header
+from backend.shell.session.reader import open_session
 from backend.site.site import load_site
 
 ROS = get_typestore(Stores.ROS2_HUMBLE)
@@ -331,3 +334,37 @@ def test_an_existing_session_is_never_overwritten(tmp_path: Path) -> None:
     assert run.returncode == 2
     assert "exists already" in run.stderr
     assert (tmp_path / "out.mcap").read_text() == "precious"
+
+
+def test_a_foreign_mcap_is_played_directly_with_the_site_files_topics(
+    tmp_path: Path, repository: Path
+) -> None:
+    """The same poses from the recording itself and from what it is converted to."""
+    text = (repository / "scenes" / "sites" / "demo.toml").read_text()
+    named = text.replace(
+        'label = "LEFT"\n',
+        'label = "LEFT"\ntopics = { joint_states = "/zx200/joint_states", '
+        'gnss_heading = "/ins", imu = { base = "/ins" } }\n',
+    )
+    (tmp_path / "site.toml").write_text(named)
+    site = load_site(str(tmp_path / "site.toml"))
+    content = [(f"/zx200{t[5:]}" if "joint" in t else t, k, m) for t, k, m in messages("/left")]
+    content = [("/ins" if "imu" in t else t, k, m) for t, k, m in content if "heading" not in t]
+    bag = write_bag(tmp_path / "bag", content, StoragePlugin.MCAP)
+    direct = open_session(bag)
+    topics = Topics.of(site, direct)
+    converted = open_session(convert(bag, site, tmp_path / "out.mcap").out)
+    heard = [
+        [
+            (type(s).__name__, s.machine, s.stamp)
+            for p in portions(session, of)
+            for s in p.inputs.samples
+        ]
+        for session, of in ((direct, topics), (converted, Topics.of(site, converted)))
+    ]
+    assert sorted(heard[0]) == sorted(heard[1])
+    assert {name for name, _, _ in heard[0]} == {
+        "JointSample", "FixSample", "HeadingSample", "AttitudeSample",
+    }  # fmt: skip
+    assert len(heard[0]) == 35
+    assert not any("left" in problem for problem in problems_of(direct, topics))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import tomllib
 from itertools import pairwise
 from pathlib import Path
 
@@ -15,13 +14,12 @@ from backend.documents.snapshot import snapshot_document
 from backend.pipeline.records import Snapshot
 from backend.safety.record import Level
 from backend.shell.app.wire import dumps
-from backend.shell.session.cycles import PERIOD, Topics, document, portions, problems
+from backend.shell.session.cycles import PERIOD, document, portions, problems
 from backend.shell.session.evaluate import evaluate, merged
 from backend.shell.session.format import CYCLE, SNAPSHOT, Message
 from backend.shell.session.reader import open_session
 from backend.shell.session.recorded_snapshot import NotASnapshot, recorded_snapshot
 from backend.shell.session.writer import SessionWriter
-from backend.site.site import parse_site
 
 
 def text(snapshot: Snapshot, lived: Lived) -> str:
@@ -161,34 +159,3 @@ def test_problems_name_strangers_and_what_is_missing(lived: Lived, tmp_path: Pat
     assert any("/right/joint_states" in text for text in problems(session, other))
     nobody = dataclasses.replace(lived.topics, machines={"third": "third"})
     assert any("third: nothing was recorded" in text for text in problems(session, nobody))
-
-
-def test_topics_that_the_site_file_names_are_played(lived: Lived, tmp_path: Path) -> None:
-    """Another program's file, its topics called as it pleases."""
-    names = {"joint_states": "/rig7/joints", "gnss/fix": "/rig7/where"}
-    session = open_session(lived.path)
-    writer = SessionWriter(tmp_path / "a.mcap", session.headers[0])
-    for message in session.messages():
-        if message.topic.startswith("/left/"):
-            suffix = message.topic.removeprefix("/left/")
-            topic = names.get(suffix, message.topic)
-            kind = session.topics[message.topic].type
-            writer.write_as(dataclasses.replace(message, topic=topic), kind)
-        elif message.topic not in (SNAPSHOT, CYCLE):
-            writer.write(message)
-    writer.close()
-    other = open_session(tmp_path / "a.mcap")
-    assert any("/rig7/joints" in text for text in problems(other, lived.topics))
-    text_ = lived.site.path.read_text().replace(
-        "[machine.start]",
-        '[machine.topics]\njoint_states = "/rig7/joints"\n'
-        'gnss_fix = "/rig7/where"\n\n[machine.start]',
-        1,
-    )
-    site = parse_site(tomllib.loads(text_), lived.site.path)
-    topics = Topics.of(site)
-    assert problems(other, topics) == ()
-    last = [s for _, s in evaluate(other, topics, lived.config, every=10)][-1]
-    then = lived.snapshots[-1].machines["left"].pose
-    assert last.machines["left"].pose.validity is then.validity
-    assert last.machines["left"].pose.joints == pytest.approx(then.joints, abs=0.05)

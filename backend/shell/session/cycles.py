@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
 import math
 from collections.abc import Collection, Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from contextlib import suppress
+from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 import msgspec
@@ -17,6 +17,7 @@ from backend.shell.link.codec import DecodeError, decode
 from backend.shell.link.messages import AgentStatus, Command, TrueState
 from backend.shell.link.topics import Direction, match
 from backend.shell.session.format import CLOCK, CYCLE, OWN, Message, seconds
+from backend.shell.session.mapping import map_topics
 from backend.shell.session.reader import Session
 from backend.site.site import Site
 
@@ -28,6 +29,9 @@ NEEDED: dict[str, tuple[str, ...]] = {  # for a pose: how the topics' names begi
     "positions": ("gnss/fix", "gnss/projected"),
     "headings": ("gnss/heading",),
 }
+
+Owner: TypeAlias = tuple[str, str]
+"""(machine, suffix of the key below its prefix)."""
 
 
 @dataclass(frozen=True)
@@ -42,31 +46,35 @@ class Portion:
     cycle: int | None = None
 
 
-Owner: TypeAlias = tuple[str, str]
-"""A machine's name and the suffix below its prefix, such as "gnss/fix"."""
-
-
 @dataclass(frozen=True)
 class Topics:
-    """Which topics are of which machine. machines: key prefix on the wire -> name; named: topics of
-    other programs' recordings that the site file names -> what they are.
+    """Which topics are of which machine. machines: key prefix on the wire -> name.
+
+    named: in other programs' recordings the owners of every topic that is of use, as the site file
+    has it; None in ours. notes: what is not of use there, in words.
     """
 
     machines: Mapping[str, str]
-    named: Mapping[str, tuple[Owner, ...]] = field(default_factory=dict)
+    named: Mapping[str, tuple[Owner, ...]] | None = None
+    notes: tuple[str, ...] = ()
 
     @staticmethod
-    def of(site: Site) -> Topics:
-        named: dict[str, tuple[Owner, ...]] = {}
-        for machine in site.machines:
-            for suffix, topic in machine.topics.streams.items():
-                named[topic] = (*named.get(topic, ()), (machine.name, suffix))
-        return Topics({machine.prefix: machine.name for machine in site.machines}, named)
+    def of(site: Site, session: Session | None = None) -> Topics:
+        """session: its topics are looked up in the site file where another program made it."""
+        machines = {machine.prefix: machine.name for machine in site.machines}
+        if session is None or session.headers:
+            return Topics(machines)
+        mapped = map_topics(site, {topic: info.type for topic, info in session.topics.items()})
+        named = {
+            topic: tuple((stream.machine, stream.suffix) for stream in streams)
+            for topic, streams in mapped.streams.items()
+        }
+        return Topics(machines, named, tuple(note.rstrip(".") for note in mapped.unused))
 
     def owners(self, topic: str) -> tuple[Owner, ...]:
-        """What a topic is; empty for those of no machine. An INS may be position and heading."""
-        if topic in self.named:
-            return self.named[topic]
+        """(machine, suffix below its prefix) of a topic; none for those of no machine."""
+        if self.named is not None:
+            return self.named.get(topic, ())
         key = topic.removeprefix("/")
         for prefix, name in self.machines.items():
             if key.startswith(f"{prefix}/"):
@@ -74,16 +82,13 @@ class Topics:
         return ()
 
     def fused(self, topics: Collection[str]) -> dict[str, tuple[Owner, ...]]:
-        """Those of `topics` that a pose is made from, and what they are."""
+        """Those of `topics` that a pose is made from, each with its machine and suffix."""
         found = {}
         for topic in topics:
-            owners = tuple(
-                (name, suffix)
-                for name, suffix in self.owners(topic)
-                if (row := match(suffix)) is not None and _for_fusion(row[0])
-            )
-            if owners:
-                found[topic] = owners
+            rows = [(owner, match(owner[1])) for owner in self.owners(topic)]
+            used = tuple(owner for owner, row in rows if row and _for_fusion(row[0]))
+            if used:
+                found[topic] = used
         return found
 
 
@@ -103,11 +108,11 @@ def problems(session: Session, topics: Topics) -> tuple[str, ...]:
     strangers = set()
     for topic in session.topics:
         owners = topics.owners(topic)
-        for name, suffix in owners:
-            owned[name].append(suffix)
+        for machine, suffix in owners:
+            owned[machine].append(suffix)
         if not owners and not topic.startswith(OWN):
             strangers.add(topic)
-    found = []
+    found = list(topics.notes)
     if strangers:
         shown = ", ".join(sorted(strangers)[:5]) + (" …" if len(strangers) > 5 else "")
         listed = ", ".join(sorted(topics.machines))
@@ -154,14 +159,12 @@ def samples(session: Session, topics: Topics, messages: Iterable[Message]) -> It
     """The samples in some of a session's messages; what cannot be decoded is left out."""
     reader = _Reader(session, topics)
     for message in messages:
-        try:
+        with suppress(DecodeError):
             yield from reader.samples(message)
-        except DecodeError:
-            continue
 
 
 class _Reader:
-    """Messages to samples. fused: topic -> machines and suffixes."""
+    """Messages to samples. fused: topic -> its owners."""
 
     def __init__(self, session: Session, topics: Topics) -> None:
         self.session = session
@@ -173,20 +176,16 @@ class _Reader:
         return seconds(time, self._offset)
 
     def samples(self, message: Message) -> list[Sample]:
-        """Empty for what is not for the fusion. Raises DecodeError."""
+        """What is for the fusion: one, none, or several of a topic with several owners. Raises
+        DecodeError."""
         if message.topic == CLOCK:
-            return self._clock(message)
+            trip = self._clock(message)
+            return [] if trip is None else [trip]
         arrival = self.local(message.time)
-        return [
-            found
-            for machine, suffix in self.fused[message.topic]
-            if not isinstance(
-                found := decode(machine, suffix, message.data, arrival),
-                (AgentStatus, Command, TrueState),
-            )
-        ]
+        decoded = (decode(*owner, message.data, arrival) for owner in self.fused[message.topic])
+        return [s for s in decoded if not isinstance(s, (AgentStatus, Command, TrueState))]
 
-    def _clock(self, message: Message) -> list[Sample]:
+    def _clock(self, message: Message) -> ClockSample | None:
         try:
             trip = document(message.data)
             machine = str(trip["machine"])
@@ -194,11 +193,11 @@ class _Reader:
         except (ValueError, TypeError, KeyError) as error:
             raise DecodeError(f"clock: {error}") from error
         if machine not in self.names:
-            return []
+            return None
         moved = self.local(message.time) - received
         if abs(moved) > SET:
             sent, received = sent + moved, received + moved
-        return [ClockSample(machine, sent, remote, received)]
+        return ClockSample(machine, sent, remote, received)
 
 
 def _recorded(reader: _Reader, messages: Iterator[Message]) -> Iterator[Portion]:
@@ -207,7 +206,7 @@ def _recorded(reader: _Reader, messages: Iterator[Message]) -> Iterator[Portion]
     for message in messages:
         if message.topic != CYCLE:
             # What could not be decoded then cannot be now: the cycle's message counts it.
-            with contextlib.suppress(DecodeError):
+            with suppress(DecodeError):
                 heard += reader.samples(message)
             continue
         try:
@@ -261,9 +260,8 @@ def _periodic(
         try:
             heard += reader.samples(message)
         except DecodeError:
-            owners = reader.fused.get(message.topic, (("", message.topic),))
-            key = "/".join(owners[0])
-            malformed[key] = malformed.get(key, 0) + 1
+            machine, suffix = reader.fused.get(message.topic, (("", message.topic),))[0]
+            malformed[f"{machine}/{suffix}"] = malformed.get(f"{machine}/{suffix}", 0) + 1
     while due <= last or heard:
         yield portion()
         due += PERIOD

@@ -36,13 +36,18 @@ class Stream:
 class Mapped:
     """streams: by topic of the recording, more than one where an INS gives attitude and heading.
 
-    notes: in words, what is of the site but cannot be used, and which machines have nothing.
+    unused: in words, what is of the site but not of use; lacking: what machines have no data for.
     unknown: topics that are of no machine of the site.
     """
 
     streams: dict[str, tuple[Stream, ...]]
-    notes: tuple[str, ...]
+    unused: tuple[str, ...]
+    lacking: tuple[str, ...]
     unknown: tuple[str, ...]
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        return (*self.unused, *self.lacking)
 
 
 def stream_of(site: Site, topic: str) -> Stream | None:
@@ -90,15 +95,15 @@ def map_topics(site: Site, types: Mapping[str, str]) -> Mapped:
             for stream in found
             if stream not in right
         ]
-    return Mapped(fitting, (*notes, *_missing(site, fitting)), tuple(sorted(unknown)))
+    return Mapped(fitting, tuple(notes), _missing(site, fitting), tuple(sorted(unknown)))
 
 
 def refuse_nothing(mapped: Mapped, where: str) -> None:
     """Raises InputError when no topic of a recording is of a machine of the site."""
     if mapped.streams:
         return
-    if mapped.notes and not mapped.unknown:
-        raise InputError(f"{where}: {mapped.notes[0]}")
+    if mapped.unused and not mapped.unknown:
+        raise InputError(f"{where}: {mapped.unused[0]}")
     present = ", ".join(mapped.unknown[:_SHOWN]) or "none"
     more = f" and {len(mapped.unknown) - _SHOWN} more" if len(mapped.unknown) > _SHOWN else ""
     raise InputError(
@@ -107,7 +112,7 @@ def refuse_nothing(mapped: Mapped, where: str) -> None:
     )
 
 
-def _missing(site: Site, streams: Mapping[str, tuple[Stream, ...]]) -> list[str]:
+def _missing(site: Site, streams: Mapping[str, tuple[Stream, ...]]) -> tuple[str, ...]:
     """One sentence for each machine whose pose cannot be told from what is there."""
     notes = []
     for machine in site.machines:
@@ -122,7 +127,7 @@ def _missing(site: Site, streams: Mapping[str, tuple[Stream, ...]]) -> list[str]
                 f'machine "{machine.name}" has no {", ".join(lacking)} here, '
                 "so its pose stays unknown."
             )
-    return notes
+    return tuple(notes)
 
 
 def _stream(machine: str, prefix: str, suffix: str) -> Stream | None:
