@@ -22,7 +22,7 @@ SECOND = 1_000_000_000
 WARM = round((SPAN + 0.5) * SECOND)  # what the fusion remembers, and the radio's delay [ns]
 CLOCKS = round((WINDOW + 1.0) * SECOND)  # what the estimate of a clock remembers [ns]
 SETTLE = round((ON_DELAY + OFF_DELAY + 0.05) * SECOND)  # what alarms remember [ns]
-SETTLE_EVERY = 8  # portions to a step then, before the one that is shown
+SETTLE_EVERY = 16  # portions to a step then, before the one that is shown
 LOOK_BACK = 30 * SECOND  # for the newest recorded snapshot
 
 
