@@ -23,6 +23,7 @@ WARM = round((SPAN + 0.5) * SECOND)  # what the fusion remembers, and the radio'
 CLOCKS = round((WINDOW + 1.0) * SECOND)  # what the estimate of a clock remembers [ns]
 SETTLE = round((ON_DELAY + OFF_DELAY + 0.05) * SECOND)  # what alarms remember [ns]
 SETTLE_EVERY = 16  # portions to a step then, before the one that is shown
+EXACT = 3  # cycles in a row, so that the common time no longer hangs on the ones left out
 LOOK_BACK = 30 * SECOND  # for the newest recorded snapshot
 
 
@@ -80,12 +81,14 @@ class EvaluatedTrack:
             return None
         before = Inputs(tuple(samples(self._session, self._topics, self._before(start))))
         self._evaluator.put_aside(Portion(self._next.now, start, before, self._next.cycle))
-        shown, count = None, 0
+        before_it: list[Portion] = []
         while (portion := self._next) is not None and portion.time <= time:
+            before_it.append(portion)
             self._next = next(self._portions, None)
-            last = self._next is None or self._next.time > time
-            count += portion.time > time - SETTLE
-            if last or (portion.time > time - SETTLE and count % SETTLE_EVERY == 1):
+        shown = None
+        for left, portion in zip(range(len(before_it), 0, -1), before_it, strict=True):
+            settles = portion.time > time - SETTLE and left % SETTLE_EVERY == 0
+            if left <= EXACT or settles:
                 shown = Shown(portion.time, self._evaluator.step(portion))
             else:
                 self._evaluator.put_aside(portion)
