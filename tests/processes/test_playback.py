@@ -26,7 +26,7 @@ from backend.shell.session.synthetic import Script, synthesize
 from backend.site.site import load_site
 from cockpit.desk import load_models, make_config
 
-pytestmark = [pytest.mark.processes, pytest.mark.timeout(300)]
+pytestmark = [pytest.mark.processes, pytest.mark.timeout(600)]
 
 
 @pytest.fixture(scope="module")
@@ -133,7 +133,7 @@ def test_the_diff_runs_beside(playing: Backend) -> None:
     request = urllib.request.Request(playing.url + "/api/session/diff", method="POST")
     with urllib.request.urlopen(request, timeout=10) as answer:
         assert answer.status == 202
-    deadline = time.monotonic() + 200.0
+    deadline = time.monotonic() + 500.0
     while (found := playing.get("/api/session/diff"))["state"] == "running":
         assert time.monotonic() < deadline
         time.sleep(0.3)
