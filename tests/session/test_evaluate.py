@@ -53,8 +53,8 @@ def test_what_is_put_aside_is_not_lost(lived: Lived) -> None:
     assert len(every) == len(lived.snapshots) // 5
     for few, all_ in zip(every, lived.snapshots[4::5], strict=True):
         for name, state in few.machines.items():
-            then = all_.machines[name].pose.joints  # at a common time that is 0 to 1 us off
-            assert state.pose.joints == pytest.approx(then, abs=1e-5)
+            then = all_.machines[name].pose.joints  # at a common time less than 1 ms off
+            assert state.pose.joints == pytest.approx(then, abs=1e-3)
             counted = {k: s.received for k, s in state.pose.streams.items()}
             assert counted == {k: s.received for k, s in all_.machines[name].pose.streams.items()}
 
