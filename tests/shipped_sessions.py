@@ -14,7 +14,9 @@ SESSIONS = Path(__file__).resolve().parents[1] / "scenes" / "sessions"
 def main() -> None:
     site = load_site("demo")
     config = make_config(site, load_models(site), (), "DEMO")
-    synthesize(SESSIONS / "near-miss.mcap", site, config, Script(duration=40.0, begin=14.0))
+    path = SESSIONS / "near-miss.mcap"
+    path.unlink(missing_ok=True)
+    synthesize(path, site, config, Script(duration=40.0, begin=14.0))
 
 
 if __name__ == "__main__":
