@@ -36,6 +36,7 @@ from backend.shell.session.reader import Session, open_session
 from backend.shell.session.ring import parts_of, pins_of, recordings_of
 from backend.site.site import Site, load_site, parse_site, shipped_sites
 from cockpit.desk import LOOPBACK, Desk, image_loops, load_models, make_config
+from cockpit.foreign import as_session
 from cockpit.resolutions import resolutions
 from cockpit.session_document import session_document
 from cockpit.session_files import session_file
@@ -69,7 +70,7 @@ def open_with_progress(path: Path) -> Session:
 
 def see(path: Path, site_name: str | None, mode: str = MODE) -> Seen:
     """Opens a session on the site that it was recorded on, or on another. Raises InputError."""
-    session = open_with_progress(path)
+    session = open_with_progress(as_session(path, site_name))
     site = load_site(site_name) if site_name else recorded_site(session)
     try:
         models = load_models(site)
