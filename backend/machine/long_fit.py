@@ -142,12 +142,13 @@ def annealed(link: Link, boxes: Set, tolerance: float, hot: float, seed: int) ->
 
 
 def _closed(link: Link, boxes: Set, wanted: float) -> tuple[Boxes, float]:
-    """The boxes polished and grown over what they left out, and their excess [m]."""
+    """The boxes grown over what they left out, polished first where that helps; their excess [m]."""
     space, pockets = room(link.distance, wanted)
     points = np.concatenate([link.points, thin(pockets, 0.05)])
     best: tuple[Boxes, float] | None = None
-    for again in range(3):
-        boxes = polished(boxes, points, space, wanted, 8 if again else 16)
+    for again in range(4):
+        if again:
+            boxes = polished(boxes, points, space, wanted, 8 if again > 1 else 16)
         middles = np.einsum("kji,kj->ki", boxes.R, boxes.c)
         low, high = middles - boxes.h, middles + boxes.h
         low, high = grown(link.triangles, boxes.R, low, high, _FINE)
@@ -160,7 +161,7 @@ def _closed(link: Link, boxes: Set, wanted: float) -> tuple[Boxes, float]:
         rest = link.triangles
         for R, c, h in zip(boxes.R, middles, boxes.h, strict=True):
             rest = outside_box(rest, R, c - h, c + h)
-        if not len(rest):
+        if again and not len(rest):
             break
         points = np.concatenate([points, thin(subdivided(rest, _FINE).reshape(-1, 3), 0.01)])
     assert best is not None

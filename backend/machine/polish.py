@@ -49,7 +49,7 @@ class Set:
 
 
 def polished(
-    boxes: Set, points: Array, room: Field, wanted: float, rounds: int, spacing: float = 0.05
+    boxes: Set, points: Array, room: Field, wanted: float, rounds: int, spacing: float = 0.03
 ) -> Set:
     """The boxes after at most `rounds` steps, ended early where none helps or `wanted` is reached.
 
