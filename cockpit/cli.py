@@ -170,7 +170,7 @@ def fit(
     ] = 20,
     seed: Annotated[int, typer.Option(min=0, help="Another number makes other searches.")] = 0,
 ) -> None:
-    """Search long for boxes around a machine's meshes; prints [bodies.boxes] for its sidecar."""
+    """Search long for boxes around a machine's meshes; prints TOML for its sidecar."""
     from cockpit.fit import run_fit
 
     run_fit(model, sidecar, tuple(link or ()), starts, seed)

@@ -142,7 +142,7 @@ def annealed(link: Link, boxes: Set, tolerance: float, hot: float, seed: int) ->
 
 
 def _closed(link: Link, boxes: Set, wanted: float) -> tuple[Boxes, float]:
-    """The boxes grown over what they left out, polished first where that helps; their excess [m]."""
+    """The boxes, polished where that helps, grown over what they left out; their excess [m]."""
     space, pockets = room(link.distance, wanted)
     points = np.concatenate([link.points, thin(pockets, 0.05)])
     best: tuple[Boxes, float] | None = None
