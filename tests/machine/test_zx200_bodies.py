@@ -147,7 +147,7 @@ def test_bodies_exceed_the_meshes_by_no_more_than_stated(
     meshes = [v.vertices[v.faces] for v in zx200.links[link].visuals]
     triangles = np.concatenate([*meshes, *([swept[link]] if link in swept else [])])
     measured = excess(bodies_of(zx200, link), triangles)
-    print(f"\n{part}: expected <= {STATED[part]:.2f} m, measured {measured:.3f} m")
+    print(f"\n{part}: expected <= {STATED[part]:.3f} m, measured {measured:.3f} m")
     assert measured <= STATED[part]
 
 
