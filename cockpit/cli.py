@@ -180,6 +180,26 @@ def cspace(
 
 
 @app.command()
+def fit(
+    model: Annotated[str, typer.Argument(help="Shipped machine's name or path of a URDF, xacro.")],
+    sidecar: Annotated[
+        str | None, typer.Option(help="Its sidecar; without it the one that loading would take.")
+    ] = None,
+    link: Annotated[
+        list[str] | None, typer.Option(help="Only this link, may be repeated; default all.")
+    ] = None,
+    starts: Annotated[
+        int, typer.Option(min=1, help="Searches for each link, about a minute each.")
+    ] = 20,
+    seed: Annotated[int, typer.Option(min=0, help="Another number makes other searches.")] = 0,
+) -> None:
+    """Search long for boxes around a machine's meshes; prints TOML for its sidecar."""
+    from cockpit.fit import run_fit
+
+    run_fit(model, sidecar, tuple(link or ()), starts, seed)
+
+
+@app.command()
 def schema(
     name: Annotated[
         str, typer.Argument(help="Document's name; without it the names are listed.")

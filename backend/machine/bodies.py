@@ -14,6 +14,8 @@ from backend.errors import InputError
 from backend.machine import fitting
 from backend.machine.meshes import triangles_of
 from backend.machine.model import PARTS
+from backend.machine.sidecar import BodiesTable
+from backend.machine.stated import checked
 from backend.machine.urdf import Geometry, UrdfLink
 from backend.spatial.boxes import Boxes
 from backend.spatial.types import Array
@@ -27,27 +29,39 @@ _MARKER = 0.02  # [m] visuals up to this size mark a frame, they are no bodies
 def link_boxes(
     link: UrdfLink,
     swept: Array,
-    folder: Path,
-    file: str,
-    max_boxes: int,
-    max_excess: float,
+    robot_file: Path,
+    stated: BodiesTable,
+    side_file: str,
     progress: Progress | None,
 ) -> Boxes:
     """The bodies of one link in its frame.
 
     Collision boxes are taken as they are, cylinders and spheres as their bounding boxes; meshes,
-    and `swept` triangles (n, 3, 3) of hydraulic cylinders, are fitted. A link without collision
-    geometry uses its visuals.
+    and `swept` triangles (n, 3, 3) of hydraulic cylinders, are fitted, unless the sidecar states
+    their boxes. A link without collision geometry uses its visuals. Raises InputError for stated
+    boxes that do not contain all of it.
     """
-    shapes = link.collisions or tuple(v for v in link.visuals if not _is_marker(v))
-    primitives = [s for s in shapes if s.kind != "mesh"]
-    meshes = [s for s in shapes if s.kind == "mesh"]
-    parts = [box_of(s) for s in primitives]
-    triangles = np.concatenate([*(triangles_of(m, folder, file) for m in meshes), swept])
-    if len(triangles):
-        free = max(max_boxes - len(parts), 2)
-        parts.append(fitted(triangles, free, max_excess, link.name, progress))
+    parts = [box_of(s) for s in _shapes(link) if s.kind != "mesh"]
+    triangles = to_be_fitted(link, swept, robot_file)
+    if link.name in stated.boxes:
+        tables = stated.boxes[link.name]
+        parts.append(checked(tables, triangles, link.name, side_file, str(robot_file)))
+    elif len(triangles):
+        free = free_boxes(link, stated)
+        parts.append(fitted(triangles, free, stated.max_excess, link.name, progress))
     return join(parts)
+
+
+def to_be_fitted(link: UrdfLink, swept: Array, robot_file: Path) -> Array:
+    """The triangles (n, 3, 3) [m] of a link that boxes have to contain, in its frame."""
+    meshes = [s for s in _shapes(link) if s.kind == "mesh"]
+    folder, file = robot_file.parent, str(robot_file)
+    return np.concatenate([*(triangles_of(m, folder, file) for m in meshes), swept])
+
+
+def free_boxes(link: UrdfLink, stated: BodiesTable) -> int:
+    """How many boxes the fit of a link may use: those its primitives leave, two at least."""
+    return max(stated.max_boxes - sum(s.kind != "mesh" for s in _shapes(link)), 2)
 
 
 def box_of(shape: Geometry) -> Boxes:
@@ -72,6 +86,10 @@ def join(parts: list[Boxes]) -> Boxes:
         np.concatenate([p.rotations for p in parts]),
         np.concatenate([p.half_extents for p in parts]),
     )
+
+
+def _shapes(link: UrdfLink) -> tuple[Geometry, ...]:
+    return link.collisions or tuple(v for v in link.visuals if not _is_marker(v))
 
 
 def _is_marker(shape: Geometry) -> bool:

@@ -46,21 +46,21 @@ def fit_boxes(
     if not np.isfinite(triangles).all():
         raise ValueError("triangles must be finite")
     report = progress or (lambda share: None)
-    mesh = _mesh_points(triangles)
+    mesh = mesh_tree(triangles)
     one = _around(triangles)
-    if _farthest(one, mesh, 0.03) <= max_excess:
+    if farthest(one, mesh, 0.03) <= max_excess:
         return one
-    points = _points(triangles)
+    points = outer_points(triangles)
     field = distance_field(triangles)
 
     best, least = one, np.inf
 
     def judge(R: Array, low: Array, high: Array) -> None:
         nonlocal best, least
-        low, high = _grown(triangles, R, low, high)
+        low, high = grown(triangles, R, low, high)
         centers = (R @ ((low + high) / 2.0)[:, :, None])[:, :, 0]
         boxes = Boxes(centers, R, (high - low) / 2.0 + PAD)
-        value = _farthest(boxes, mesh, 0.03)
+        value = farthest(boxes, mesh, 0.03)
         if value < least:
             best, least = boxes, value
 
@@ -90,7 +90,7 @@ def excess(boxes: Boxes, triangles: Array, spacing: float = 0.03) -> float:
     grid of at most `spacing` [m] on each face; points inside another box are not on the surface.
     triangles: (n, 3, 3) [m]. The mesh is sampled at 15 mm, so the value errs high by < 1 cm.
     """
-    return _farthest(boxes, _mesh_points(np.asarray(triangles, dtype=float)), spacing)
+    return farthest(boxes, mesh_tree(np.asarray(triangles, dtype=float)), spacing)
 
 
 def surface_points(boxes: Boxes, spacing: float) -> Array:
@@ -114,16 +114,18 @@ def _around(triangles: Array) -> Boxes:
     return Boxes(((low + high) / 2.0)[None], np.eye(3)[None], ((high - low) / 2.0 + PAD)[None])
 
 
-def _mesh_points(triangles: Array) -> cKDTree:
+def mesh_tree(triangles: Array) -> cKDTree:
+    """Points on triangles (n, 3, 3) [m], 15 mm apart, to measure distances to the mesh."""
     return cKDTree(thin(sample(triangles, 0.015), 0.005))
 
 
-def _farthest(boxes: Boxes, mesh: cKDTree, spacing: float) -> float:
+def farthest(boxes: Boxes, mesh: cKDTree, spacing: float) -> float:
+    """`excess` of the boxes over the mesh of `mesh_tree` [m]."""
     points = surface_points(boxes, spacing)
     return float(np.max(mesh.query(points)[0])) if len(points) else 0.0
 
 
-def _points(triangles: Array) -> Array:
+def outer_points(triangles: Array) -> Array:
     """Points of the mesh for the search: the outermost of small cubes, at most some 25,000."""
     dense, cell = sample(triangles, 0.03), 0.06
     points = extremes(dense, cell)
@@ -133,16 +135,18 @@ def _points(triangles: Array) -> Array:
     return np.ascontiguousarray(points)
 
 
-def _grown(triangles: Array, R: Array, low: Array, high: Array) -> tuple[Array, Array]:
+def grown(
+    triangles: Array, R: Array, low: Array, high: Array, longest: float = 0.05
+) -> tuple[Array, Array]:
     """low, high (k, 3) so that every triangle is inside the union of boxes.
 
-    What is outside of all boxes is cut into small triangles; each joins the box that has to grow
-    least for it.
+    What is outside of all boxes is cut into small triangles, no edge over `longest` [m]; each joins
+    the box that has to grow least for it.
     """
     rest = triangles
     for k in range(len(R)):
         rest = outside_box(rest, R[k], low[k], high[k])
-    rest = subdivided(rest, 0.05)
+    rest = subdivided(rest, longest)
     if not len(rest):
         return low, high
     local = np.einsum("nci,kij->kncj", rest, R)  # (k, n, 3, 3)

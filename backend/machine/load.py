@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +13,7 @@ from backend.machine.bodies import Progress
 from backend.machine.expand import urdf_text
 from backend.machine.limits import actuated_joint, read_joint_limits
 from backend.machine.meshes import visuals_of
-from backend.machine.model import PARTS, ROLES, Antenna, Link, Machine, Tracks
+from backend.machine.model import PARTS, ROLES, Antenna, Joint, Link, Machine, Tracks
 from backend.machine.roles import assign_roles
 from backend.machine.sidecar import Sidecar, read_sidecar
 from backend.machine.sweeps import swept_by_cylinders
@@ -22,7 +22,30 @@ from backend.spatial.boxes import Boxes
 from backend.spatial.types import Array, frozen
 
 SHIPPED = Path(__file__).resolve().parents[2] / "scenes" / "machines"
+_NOTHING: Array = np.zeros((0, 3, 3))
 _SUFFIXES = (".urdf", ".xacro", ".xml")
+
+
+@dataclass(frozen=True)
+class FitTask:
+    """Triangles (n, 3, 3) [m] in the link's frame, and how many boxes may stand for them."""
+
+    triangles: Array
+    max_boxes: int
+
+
+@dataclass(frozen=True)
+class _Description:
+    """All that the files say, before any body is made. swept: by link, see `sweeps`."""
+
+    robot_file: Path
+    robot: Description
+    side: Sidecar
+    side_name: str
+    joints: tuple[Joint, ...]
+    links: tuple[Link, ...]
+    swept: dict[int, Array]
+    notes: list[str]
 
 
 def shipped_machines() -> list[str]:
@@ -42,31 +65,10 @@ def load_machine(
     NAME.toml beside the file is used, else the shipped scenes/machines/ROBOT.toml, else defaults,
     which Machine.assumptions lists. Raises InputError.
     """
-    robot_file = _locate(model, base_folder)
-    file = str(robot_file)
-    robot = parse(urdf_text(robot_file), file)
-    side_file = _locate_sidecar(sidecar, robot_file, robot.name, base_folder)
-    side = Sidecar() if side_file is None else read_sidecar(side_file)
-    side_name = file if side_file is None else str(side_file)
-    notes: list[str] = [] if side_file else ["no sidecar: defaults are used"]
-
-    roles, guessed = assign_roles(
-        robot, {str(role): name for role, name in side.joints.items()}, side_name
-    )
-    notes += guessed
-    yaml_file = robot_file.parent / "joint_limits.yaml"
-    stated = read_joint_limits(yaml_file, robot) if yaml_file.is_file() else {}
-    limits = {str(role): limit for role, limit in side.limits.items()}
-    for role in limits:
-        if role not in roles:
-            raise InputError(f"{side_name}: limits.{role}: the machine has no such joint.")
-    joints = tuple(
-        actuated_joint(r, j, stated.get(j.name, {}), limits.get(r), side_name, notes)
-        for r, j in roles.items()
-    )
-    links = _links(robot, roles, robot_file, notes)
-    swept = swept_by_cylinders(links, joints, side, robot_file, side_name, progress)
-    boxes, body_links = _bodies(robot, links, swept, side, robot_file, progress)
+    d = _describe(model, sidecar, base_folder, progress)
+    robot_file, robot, links, joints, side = d.robot_file, d.robot, d.links, d.joints, d.side
+    file, side_name, notes = str(robot_file), d.side_name, d.notes
+    boxes, body_links = _bodies(d, progress)
     end_link, end_point = defaults.end_point(
         robot, links, joints, side, side_name, robot_file, notes
     )
@@ -105,6 +107,55 @@ def load_machine(
     if not side.masses_trusted:
         notes.append("masses are not trusted: nothing is concluded from them")
     return replace(machine, assumptions=tuple(notes))
+
+
+def fit_tasks(
+    model: str,
+    sidecar: str | Path | None = None,
+    base_folder: Path | None = None,
+    progress: Progress | None = None,
+) -> tuple[dict[str, FitTask], Sidecar]:
+    """What has to be fitted of each link that has any, by the URDF's names, and the sidecar.
+
+    The arguments are those of `load_machine`; so is what is raised.
+    """
+    d = _describe(model, sidecar, base_folder, progress)
+    tasks: dict[str, FitTask] = {}
+    for i, stated in enumerate(d.robot.links):
+        triangles = bodies.to_be_fitted(stated, d.swept.get(i, _NOTHING), d.robot_file)
+        if len(triangles):
+            tasks[stated.name] = FitTask(triangles, bodies.free_boxes(stated, d.side.bodies))
+    return tasks, d.side
+
+
+def _describe(
+    model: str, sidecar: str | Path | None, base_folder: Path | None, progress: Progress | None
+) -> _Description:
+    robot_file = _locate(model, base_folder)
+    file = str(robot_file)
+    robot = parse(urdf_text(robot_file), file)
+    side_file = _locate_sidecar(sidecar, robot_file, robot.name, base_folder)
+    side = Sidecar() if side_file is None else read_sidecar(side_file)
+    side_name = file if side_file is None else str(side_file)
+    notes: list[str] = [] if side_file else ["no sidecar: defaults are used"]
+
+    roles, guessed = assign_roles(
+        robot, {str(role): name for role, name in side.joints.items()}, side_name
+    )
+    notes += guessed
+    yaml_file = robot_file.parent / "joint_limits.yaml"
+    stated = read_joint_limits(yaml_file, robot) if yaml_file.is_file() else {}
+    limits = {str(role): limit for role, limit in side.limits.items()}
+    for role in limits:
+        if role not in roles:
+            raise InputError(f"{side_name}: limits.{role}: the machine has no such joint.")
+    joints = tuple(
+        actuated_joint(r, j, stated.get(j.name, {}), limits.get(r), side_name, notes)
+        for r, j in roles.items()
+    )
+    links = _links(robot, roles, robot_file, notes)
+    swept = swept_by_cylinders(links, joints, side, robot_file, side_name, progress)
+    return _Description(robot_file, robot, side, side_name, joints, links, swept, notes)
 
 
 def _locate(model: str, base_folder: Path | None) -> Path:
@@ -182,27 +233,20 @@ def _links(
     return tuple(links)
 
 
-def _bodies(
-    robot: Description,
-    links: tuple[Link, ...],
-    swept: dict[int, Array],
-    side: Sidecar,
-    robot_file: Path,
-    progress: Progress | None,
-) -> tuple[Boxes, tuple[int, ...]]:
+def _bodies(d: _Description, progress: Progress | None) -> tuple[Boxes, tuple[int, ...]]:
+    robot_file, links, stated = d.robot_file, d.links, d.side.bodies
+    known = {link.name for link in d.robot.links}
+    for name in stated.boxes:
+        if name not in known:
+            raise InputError(
+                f"{d.side_name}: bodies.boxes.{name}: '{name}' is not a link of the robot; its "
+                f"links are {', '.join(link.name for link in d.robot.links)}."
+            )
     groups: list[Boxes] = []
     owners: list[int] = []
-    nothing = np.zeros((0, 3, 3))
-    for i, stated in enumerate(robot.links):
-        boxes = bodies.link_boxes(
-            stated,
-            swept.get(i, nothing),
-            robot_file.parent,
-            str(robot_file),
-            side.bodies.max_boxes,
-            side.bodies.max_excess,
-            progress,
-        )
+    for i, link in enumerate(d.robot.links):
+        swept = d.swept.get(i, _NOTHING)
+        boxes = bodies.link_boxes(link, swept, robot_file, stated, d.side_name, progress)
         groups.append(boxes)
         owners += [i] * len(boxes)
     have = {links[i].part for i in owners}

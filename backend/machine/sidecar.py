@@ -62,11 +62,23 @@ class Limit(Table):
     max_acceleration: Positive | None = None  # [rad/s^2]
 
 
+class BoxTable(Table):
+    """center, half_extents [m] in the link's frame; turned by rpy_deg as in a URDF."""
+
+    center: Vector
+    rpy_deg: Vector = (0.0, 0.0, 0.0)
+    half_extents: tuple[Positive, Positive, Positive]
+
+
 class BodiesTable(Table):
-    """How meshes are fitted: at most max_boxes a link, at most max_excess [m] beyond the mesh."""
+    """How meshes are fitted: at most max_boxes a link, at most max_excess [m] beyond the mesh.
+
+    boxes: by the URDF's link, boxes that stand for its meshes and cylinders instead of a fit.
+    """
 
     max_boxes: Annotated[int, Field(ge=1, le=64)] = 12
     max_excess: Positive = 0.15
+    boxes: dict[str, Annotated[tuple[BoxTable, ...], Field(min_length=1, max_length=64)]] = {}
 
 
 class SelfCollision(Table):
@@ -138,6 +150,8 @@ def _fields_at(place: list[str]) -> list[str]:
         "bodies": BodiesTable,
         "self_collision": SelfCollision,
     }
-    if place:
+    if place[:2] == ["bodies", "boxes"]:
+        model = BoxTable
+    elif place:
         model = inner.get(place[0], Sidecar)
     return list(model.model_fields)

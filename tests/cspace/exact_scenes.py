@@ -11,10 +11,11 @@ import coal
 import numpy as np
 import pytest
 
-from backend.machine import bodies
+from backend.machine import bodies, load
 from backend.machine.kinematics import body_boxes, link_poses
 from backend.machine.load import load_machine
 from backend.machine.model import Machine
+from backend.machine.sidecar import BodiesTable, Sidecar, read_sidecar
 from backend.spatial import rotation, transform
 from backend.spatial.boxes import Boxes
 
@@ -38,16 +39,20 @@ def machine_named(name: str) -> Machine:
 
 
 def _zx200_of_boxes() -> Machine:
-    """The ZX200 with one box a link: fitting its meshes takes minutes."""
+    """The ZX200 with one box a link: a scene as coarse as the others."""
 
     def one_box(triangles: np.ndarray, *_: object) -> Boxes:
         points = triangles.reshape(-1, 3)
         low, high = points.min(axis=0), points.max(axis=0)
         return Boxes((low + high)[None] / 2, np.eye(3)[None], (high - low)[None] / 2)
 
+    def without_boxes(path: Path) -> Sidecar:
+        return read_sidecar(path).model_copy(update={"bodies": BodiesTable()})
+
     with pytest.MonkeyPatch.context() as patch, TemporaryDirectory() as cache:
         patch.setenv("XDG_CACHE_HOME", cache)
         patch.setattr(bodies.fitting, "fit_boxes", one_box)
+        patch.setattr(load, "read_sidecar", without_boxes)
         return load_machine("zx200.xacro", base_folder=SHARED)
 
 

@@ -8,10 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from backend.machine import bodies
 from backend.machine.load import load_machine
 from backend.machine.model import Machine
-from backend.spatial.boxes import Boxes
 
 TINY = """<robot name="tiny">
   <link name="base"><collision><origin xyz="0 0 0.2"/><geometry><box size="2 1.5 0.4"/></geometry>
@@ -68,20 +66,10 @@ def ex13() -> Machine:
     return load_machine("ex13")
 
 
-def one_box(triangles: np.ndarray, *_: object) -> Boxes:
-    """The box along the axes around all triangles: stands in for the fitting, which takes long."""
-    points = triangles.reshape(-1, 3)
-    low, high = points.min(axis=0), points.max(axis=0)
-    return Boxes((low + high)[None] / 2, np.eye(3)[None], (high - low)[None] / 2)
-
-
 @pytest.fixture(scope="session")
-def zx200(shared_data: Path, tmp_path_factory: pytest.TempPathFactory) -> Machine:
-    """The ZX200 with one box a link."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
-        patch.setattr(bodies.fitting, "fit_boxes", one_box)
-        return load_machine("zx200.xacro", base_folder=shared_data / "zx200")
+def zx200(shared_data: Path) -> Machine:
+    """The ZX200 with the boxes of its shipped sidecar."""
+    return load_machine("zx200.xacro", base_folder=shared_data / "zx200")
 
 
 @pytest.fixture(params=["mini", "ex13", "zx200"])

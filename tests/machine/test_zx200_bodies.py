@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
+from backend.errors import InputError
+from backend.machine import bodies
 from backend.machine import fitting_kernels as kernels
 from backend.machine.fitting import excess
 from backend.machine.fitting_clip import sample
@@ -17,12 +19,13 @@ from backend.machine.fitting_field import distance_field, room
 from backend.machine.load import SHIPPED, load_machine
 from backend.machine.model import Machine
 from backend.machine.sidecar import read_sidecar
+from backend.machine.stated import left_out
 from backend.machine.sweeps import swept_by_cylinders
 from backend.spatial.boxes import Boxes
 from backend.spatial.types import Array
 
-STATED = {"bucket": 0.15, "stick": 0.15, "boom": 0.20, "tracks": 0.24, "upper": 0.38}
-"""Largest excess over the meshes [m] that the README states; 0.15 m is what is wanted of all."""
+STATED = {"bucket": 0.15, "stick": 0.15, "boom": 0.185, "tracks": 0.215, "upper": 0.31}
+"""Largest excess over the meshes [m], rounded in the README; 0.15 m is what is wanted of all."""
 
 
 # Points of the upper body [m], in the link's frame, no two of which share a box, see the test.
@@ -50,7 +53,14 @@ def xacro(shared_data: Path) -> Path:
 
 @pytest.fixture(scope="module")
 def zx200(xacro: Path) -> Machine:
-    return load_machine(str(xacro))
+    """With the boxes of the shipped sidecar; nothing is fitted."""
+
+    def fit(*_: object) -> Boxes:
+        raise AssertionError("the sidecar has boxes for every link with meshes")
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(bodies, "fitted", fit)
+        return load_machine(str(xacro))
 
 
 @pytest.fixture(scope="module")
@@ -84,7 +94,6 @@ def parts(machine: Machine) -> dict[str, int]:
     }
 
 
-@pytest.mark.timeout(900)
 @pytest.mark.parametrize("part", STATED)
 def test_every_vertex_is_in_a_body_of_its_link(zx200: Machine, part: str) -> None:
     link = parts(zx200)[part]
@@ -102,6 +111,28 @@ def test_cylinders_are_enclosed_over_their_whole_strokes(
         assert covered(bodies_of(zx200, link), triangles.reshape(-1, 3)).all()
 
 
+def test_no_triangle_reaches_out_of_the_bodies(zx200: Machine, swept: dict[int, Array]) -> None:
+    """Not only the corners: every triangle is cut at every box."""
+    for link in parts(zx200).values():
+        meshes = [v.vertices[v.faces] for v in zx200.links[link].visuals]
+        triangles = np.concatenate([*meshes, *([swept[link]] if link in swept else [])])
+        assert left_out(bodies_of(zx200, link), triangles)[0] == 0.0
+
+
+def test_a_box_too_small_is_refused(xacro: Path, tmp_path: Path) -> None:
+    text = (SHIPPED / "zx200.toml").read_text()
+    before, _, after = text.partition("bucket_link = [")
+    half = after.index("half_extents = [") + len("half_extents = [")
+    sidecar = tmp_path / "zx200.toml"
+    sidecar.write_text(
+        f"{before}bucket_link = [{after[:half]}0.01, {after[half:].split(', ', 1)[1]}"
+    )
+    with pytest.raises(
+        InputError, match=r"boxes\.bucket_link: .* out of these 12 boxes, at .*cockpit"
+    ):
+        load_machine(str(xacro), sidecar)
+
+
 def test_there_are_at_most_twelve_bodies_a_link(zx200: Machine) -> None:
     counts = Counter(zx200.body_links)
     assert max(counts.values()) <= 12
@@ -116,7 +147,7 @@ def test_bodies_exceed_the_meshes_by_no_more_than_stated(
     meshes = [v.vertices[v.faces] for v in zx200.links[link].visuals]
     triangles = np.concatenate([*meshes, *([swept[link]] if link in swept else [])])
     measured = excess(bodies_of(zx200, link), triangles)
-    print(f"\n{part}: expected <= {STATED[part]:.2f} m, measured {measured:.3f} m")
+    print(f"\n{part}: expected <= {STATED[part]:.3f} m, measured {measured:.3f} m")
     assert measured <= STATED[part]
 
 

@@ -1,0 +1,172 @@
+"""A long search for the boxes of one link, for a sidecar: annealing, then polishing, many times.
+
+`fitting` finds good boxes in a minute or two; this looks for as long as it is told to, also from
+the best found so far.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from backend.machine.anneal_kernels import UNIT
+from backend.machine.anneal_loop import anneal
+from backend.machine.fitting import PAD, farthest, grown, mesh_tree, outer_points
+from backend.machine.fitting_clip import extremes, outside_box, subdivided, thin
+from backend.machine.fitting_field import Field, distance_field, room
+from backend.machine.polish import Set, polished
+from backend.machine.stated import boxes_of, left_out, tables_of
+from backend.spatial.boxes import Boxes
+from backend.spatial.types import Array
+
+MOVES = 220_000  # of one annealing
+_STAGES = 10  # between which points that stayed outside join those that are looked at
+_HOT, _WARM, _COLD = 1.2, 0.3, 0.006  # temperatures: at first, from a known solution, at last
+_PRICES = (600.0, 1500.0)  # of a cubic metre sticking out: at first, at last
+_SPACINGS = (0.06, 0.04)  # [m] at which surfaces are looked at: at first, at last
+_FIRST_CELL = 0.6  # [m] cubes whose outermost points are looked at first
+_FINE = 0.015  # [m] size of triangles over which boxes grow in the end
+_DIGITS = 2e-4  # [m] boxes are larger by, for the rounding in a sidecar
+_BELOW = 0.02  # [m] aimed below the best so far where `wanted` is out of reach
+
+
+@dataclass(frozen=True, eq=False)
+class Link:
+    """One link's mesh in the forms that the search needs; points (n, 3) [m]."""
+
+    triangles: Array
+    points: Array
+    distance: Field
+    tree: cKDTree
+
+    @classmethod
+    def of(cls, triangles: Array) -> Link:
+        """Of triangles (n, 3, 3) [m]."""
+        field = distance_field(triangles, margin=0.25, step=0.022)
+        return cls(triangles, outer_points(triangles), field, mesh_tree(triangles))
+
+
+def long_fit(
+    triangles: Array,
+    max_boxes: int,
+    wanted: float,
+    starts: int,
+    seed: int,
+    begin: Boxes | None = None,
+    progress: Callable[[float, float], None] | None = None,
+) -> tuple[Boxes, float]:
+    """(boxes that contain all triangles (n, 3, 3) [m], their excess [m] as `fitting.excess`).
+
+    At most `starts` annealings, ended by the first that comes within `wanted` [m]; every other one
+    begins at the best known boxes, the rest anywhere. begin: boxes to improve on; they count only
+    if they contain the mesh. progress: called with the share done and the best excess so far.
+    Centres, angles and half extents have the digits of a sidecar. Deterministic. Raises ValueError
+    for an empty or non-finite set.
+    """
+    triangles = np.asarray(triangles, dtype=float)
+    if triangles.ndim != 3 or triangles.shape[1:] != (3, 3) or not len(triangles):
+        raise ValueError("triangles must have shape nx3x3 with n > 0")
+    if not np.isfinite(triangles).all():
+        raise ValueError("triangles must be finite")
+    report = progress or (lambda share, least: None)
+    link = Link.of(triangles)
+    best, least = None, np.inf
+    if begin is not None and len(begin) <= max_boxes:
+        begin = boxes_of(tables_of(begin))
+        if left_out(begin, triangles)[0] == 0.0:
+            best, least = begin, farthest(begin, link.tree, 0.03)
+    for start in range(starts):
+        report(start / starts, least)
+        if least <= wanted:
+            break
+        rng = np.random.default_rng(seed + start)
+        known = best is not None and start % 2 == 0
+        boxes = _as_set(best) if known and best is not None else spread(link, max_boxes, rng)
+        aim = max(wanted, least - _BELOW) if np.isfinite(least) else 1.2 * wanted
+        boxes = annealed(link, boxes, aim, _WARM if known else _HOT, seed + start)
+        found, value = _closed(link, boxes, max(wanted - 0.002, aim - _BELOW))
+        if value < least:
+            best, least = found, value
+    report(1.0, least)
+    if best is None:  # no start was allowed
+        return _closed(link, spread(link, 1, np.random.default_rng(seed)), wanted)
+    return best, least
+
+
+def spread(link: Link, count: int, rng: np.random.Generator) -> Set:
+    """`count` small boxes at points of the mesh far from each other."""
+    points = link.points
+    chosen = [int(rng.integers(len(points)))]
+    away = np.linalg.norm(points - points[chosen[0]], axis=1)
+    while len(chosen) < count:
+        chosen.append(int(np.argmax(away * rng.uniform(0.7, 1.0, len(away)))))
+        away = np.minimum(away, np.linalg.norm(points - points[chosen[-1]], axis=1))
+    return Set(np.stack([np.eye(3)] * count), points[chosen].copy(), np.full((count, 3), 0.1))
+
+
+def annealed(link: Link, boxes: Set, tolerance: float, hot: float, seed: int) -> Set:
+    """Boxes after one annealing: the mesh inside and nothing farther out than `tolerance` [m],
+    as far as that goes."""
+    space, pockets = room(link.distance, tolerance)
+    coarse = np.clip(np.rint((space.values - tolerance) / UNIT), -127, 127).astype(np.int8)
+    pockets = thin(pockets, 0.05)
+    everything = np.ascontiguousarray(np.concatenate([link.points, pockets]))
+    points = np.concatenate([extremes(link.points, _FIRST_CELL), thin(pockets, 0.3)])
+    points, weights = np.ascontiguousarray(points), np.ones(len(points))
+    for stage in range(_STAGES):
+        share, later = stage / _STAGES, (stage + 1) / _STAGES
+        _, R, c, h = anneal(
+            points,
+            weights,
+            coarse,
+            space.origin,
+            space.step,
+            _SPACINGS[0] + (_SPACINGS[1] - _SPACINGS[0]) * share,
+            _PRICES[0] * (_PRICES[1] / _PRICES[0]) ** share,
+            (boxes.R, boxes.c, boxes.h),
+            MOVES // _STAGES,
+            hot * (_COLD / hot) ** share,
+            hot * (_COLD / hot) ** later,
+            1000 * seed + stage,
+        )
+        boxes = Set(R, c, h)
+        away = boxes.away(everything).min(axis=0)
+        order = np.argsort(-away, kind="stable")[: np.count_nonzero(away > 0.0)]
+        more = thin(everything[order], 0.06)[:150]
+        points = np.concatenate([points, more])
+        weights = np.concatenate([weights, np.ones(len(more))])
+    return boxes
+
+
+def _closed(link: Link, boxes: Set, wanted: float) -> tuple[Boxes, float]:
+    """The boxes, polished where that helps, grown over what they left out; their excess [m]."""
+    space, pockets = room(link.distance, wanted)
+    points = np.concatenate([link.points, thin(pockets, 0.05)])
+    best: tuple[Boxes, float] | None = None
+    for again in range(4):
+        if again:
+            boxes = polished(boxes, points, space, wanted, 8 if again > 1 else 16)
+        middles = np.einsum("kji,kj->ki", boxes.R, boxes.c)
+        low, high = middles - boxes.h, middles + boxes.h
+        low, high = grown(link.triangles, boxes.R, low, high, _FINE)
+        centers = (boxes.R @ ((low + high) / 2.0)[:, :, None])[:, :, 0]
+        full = Boxes(centers, boxes.R, (high - low) / 2.0 + PAD + _DIGITS)
+        full = boxes_of(tables_of(full))
+        value = farthest(full, link.tree, 0.03)
+        if best is None or value < best[1]:
+            best = full, value
+        rest = link.triangles
+        for R, c, h in zip(boxes.R, middles, boxes.h, strict=True):
+            rest = outside_box(rest, R, c - h, c + h)
+        if again and not len(rest):
+            break
+        points = np.concatenate([points, thin(subdivided(rest, _FINE).reshape(-1, 3), 0.01)])
+    assert best is not None
+    return best
+
+
+def _as_set(boxes: Boxes) -> Set:
+    return Set(boxes.rotations, boxes.centers, boxes.half_extents)
