@@ -135,9 +135,7 @@ def ends(machine: Machine, q: Array, T: Array) -> Array:
     return np.asarray(np.minimum(speed / full, 1.0))
 
 
-def at_once(
-    machine: Machine, wish: Array, found: Limits
-) -> tuple[Array, dict[int, Cause]]:
+def at_once(machine: Machine, wish: Array, found: Limits) -> tuple[Array, dict[int, Cause]]:
     """What is left of `wish` (m,) [rad/s, m/s] when all its motions happen together, and the
     causes of those that were cut.
     """

@@ -54,7 +54,9 @@ def judge(
     """
     free = np.ones((joints, 2)), np.ones(2)
     if not pairs:
-        return Concern("partner", machine, Level.CLEAR, "no machine near", *free, None, now, approach)
+        return Concern(
+            "partner", machine, Level.CLEAR, "no machine near", *free, None, now, approach
+        )
     margins = np.array([p.margin for p in pairs])
     fractions = linear(margins, limits.stop_below, limits.slow_below)
     allowed = allowed_speeds(np.array([p.gradient for p in pairs]), fractions)
