@@ -12,6 +12,7 @@ from numba import njit
 from backend.spatial.types import Array, IntArray
 
 APPROACHES = 1e-3  # slopes below this do not count as approaching [m/rad, m/m]
+BISECTIONS = 12
 STILL = 0.01  # slower motions are taken for standing [rad/s, m/s]
 
 
@@ -38,6 +39,24 @@ def _farthest(c: float, b: float, room: float) -> float:
 @njit(cache=True, nogil=True)
 def _speed(s: float, T: float, a: float) -> float:
     return 2.0 * s / (T + np.sqrt(T * T + 2.0 * s / a)) if s < np.inf else np.inf
+
+
+@njit(cache=True, nogil=True)
+def _beside(v: float, c: float, b: float, room: float, w: float, T: float, a: float) -> float:
+    """The greatest speed, at most v, of a motion beside a partner that closes with w [m/s]:
+    what it uses until it stands, and w (T + v / a), fit into the room. Rounded down.
+    """
+    low, high = 0.0, v
+    for _ in range(BISECTIONS):
+        s = v * T + v * v / (2.0 * a)
+        if _used(c, b, s) + w * (T + v / a) <= room:
+            low = v
+        else:
+            high = v
+        if low == high:
+            break
+        v = 0.5 * (low + high)
+    return low
 
 
 @njit(cache=True, nogil=True)
@@ -87,15 +106,23 @@ def single(
                 if c <= 0.0 and b <= 0.0:
                     continue
                 same = rates[k] * d > 0.0
-                left = share * room[r] - (total - rest[k] if same else total)
-                v = min(_speed(_farthest(c, b, left), T[k], a[k]), full[k])
-                if closing[r] > 0.0:
-                    partner = closing[r] * (T[k] + v / a[k])
-                    left = min(left, room[r] - partner - (total - rest[k] if same else total))
-                    v = min(_speed(_farthest(c, b, left), T[k], a[k]), v)
+                coasting = total - rest[k] if same else total
+                v = min(
+                    _speed(_farthest(c, b, share * room[r] - coasting), T[k], a[k]), speed[k, side]
+                )
+                v = _beside(v, c, b, room[r] - coasting, closing[r], T[k], a[k])
                 if v < speed[k, side]:
                     speed[k, side], row[k, side] = v, r
     return speed, row
+
+
+@njit(cache=True, nogil=True)
+def _part(linear: float, square: float, room: float) -> float:
+    """The greatest q in 0..1 with q linear + q^2 square <= room."""
+    if linear + square <= room:
+        return 1.0
+    room = max(room, 0.0)
+    return 2.0 * room / (linear + np.sqrt(linear * linear + 4.0 * square * room))
 
 
 @njit(cache=True, nogil=True)
@@ -146,11 +173,22 @@ def together(
                     elif both > 0.0:
                         linear += both
         coasting = _coasting(slope[r], bend[r], rates, T, a, wish).sum()
-        left = min(share * room[r], room[r] - closing[r] * slowest) - coasting
-        if linear + square <= left:
+        q = _part(linear, square, share * room[r] - coasting)
+        if closing[r] > 0.0 and linear + square + closing[r] * slowest > room[r] - coasting:
+            low, high = 0.0, q
+            for _ in range(BISECTIONS):
+                slowest = 0.0
+                for k in range(m):
+                    if used[k] > 0.0:
+                        slowest = max(slowest, T[k] + _speed(q * s[k], T[k], a[k]) / a[k])
+                fits = linear * q + square * q * q + closing[r] * slowest <= room[r] - coasting
+                low, high = (q, high) if fits else (low, q)
+                if low == high:
+                    break
+                q = 0.5 * (low + high)
+            q = low
+        if q >= 1.0:
             continue
-        left = max(left, 0.0)
-        q = 2.0 * left / (linear + np.sqrt(linear * linear + 4.0 * square * left))
         for k in range(m):
             if used[k] > 0.0:
                 v = _speed(q * s[k], T[k], a[k])

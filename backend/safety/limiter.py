@@ -111,7 +111,8 @@ def limit(
     lift = OVERRIDE_FRACTION if override else 0.0
     found = limits(machine, own, delay, now, lift)
     fraction, causes = found.fraction.copy(), [list(pair) for pair in found.causes]
-    shut = np.where((asked == 0.0)[:, None], False, latch.shut)
+    # A stick that now points the other way has passed its neutral.
+    shut = latch.shut & np.stack([asked < 0.0, asked > 0.0], axis=1)
     if override is None:
         for k, side in np.argwhere(shut):
             fraction[k, side] = 0.0

@@ -40,7 +40,7 @@ from backend.site.site import Site, load_site
 from backend.spatial.boxes import Boxes
 from backend.spatial.types import Array
 
-DT = 0.005  # of the simulated machines [s]
+DT = 0.01  # of the simulated machines [s]
 CYCLE = 0.02  # of the backend [s]
 NAMES = ("a", "b")
 SETTLE = 1.0  # before the sticks move [s]
@@ -108,6 +108,7 @@ class _Machine:
 def drive(plan: Drive) -> Outcome:
     """Runs one drive until its end or the first contact."""
     site = load_site("demo")
+    site = replace(site, sim=site.sim.model_copy(update={"joint_period": DT}))
     rng = np.random.default_rng((plan.seed, 7))
     machines = [machine_of(model) for model in plan.models]
     states = _placed(machines, rng)
@@ -139,7 +140,8 @@ def drive(plan: Drive) -> Outcome:
             samples += _report(one, t, radios[0], plan, rng)
         if t >= clock_due - 1e-9:
             clock_due += 0.5
-            samples += [ClockSample(n, t - plan.up - plan.down, t - plan.down, t) for n in NAMES]
+            # As in the live simulation, the clock is asked past the radio.
+            samples += [ClockSample(n, t - 0.002, t - 0.001, t) for n in NAMES]
         if t >= cycle_due - 1e-9:
             cycle_due += CYCLE
             pipeline, snapshot = step(pipeline, Inputs(tuple(samples)), t, config)
