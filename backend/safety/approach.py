@@ -125,18 +125,27 @@ def _twists(
     yaw = np.array([0.0, 0.0, motion.yaw_rate])
     omega = moved @ turning + yaw
     # v = sum_k w_k x (c - o_k) = (sum_k w_k) x c - sum_k w_k x o_k
-    v = np.cross(omega, centers) - moved @ np.cross(turning, origins)
+    v = _cross(omega, centers) - moved @ _cross(turning, origins)
     v += motion.base_velocity - np.cross(yaw, motion.T_site_root[:3, 3])
     return v, omega
+
+
+def _cross(a: Array, b: Array) -> Array:
+    """(k, 3), as numpy's, which is slow on small arrays."""
+    out = np.empty_like(a)
+    out[:, 0] = a[:, 1] * b[:, 2] - a[:, 2] * b[:, 1]
+    out[:, 1] = a[:, 2] * b[:, 0] - a[:, 0] * b[:, 2]
+    out[:, 2] = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+    return out
 
 
 def joined(parts: list[Approach]) -> Approach:
     """The rows of several partners as one; at least one part."""
     if len(parts) == 1:
         return parts[0]
-    offsets = np.cumsum([0] + [len(p.others) for p in parts[:-1]])
+    offsets = np.cumsum([0, *(len(p.others) for p in parts[:-1])])
     return Approach(
-        np.concatenate([p.index + (0, k) for p, k in zip(parts, offsets, strict=True)]),
+        np.concatenate([p.index + np.array([0, k]) for p, k in zip(parts, offsets, strict=True)]),
         parts[0].own,
         tuple(name for p in parts for name in p.others),
         np.concatenate([p.room for p in parts]),

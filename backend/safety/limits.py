@@ -76,7 +76,10 @@ class Limits:
 def limits(
     machine: Machine, concerns: tuple[Concern, ...], delay: Delay, now: float, lift: float = 0.0
 ) -> Limits:
-    """What the concerns of one machine leave of each motion. lift: no fraction falls below it (override)."""
+    """What the concerns of one machine leave of each motion.
+
+    lift: no fraction falls below it, for an override.
+    """
     n = len(machine.joints)
     fraction = np.ones((n + 2, 2))
     causes = [[FREE, FREE] for _ in range(n + 2)]

@@ -24,7 +24,7 @@ from backend.machine.load import load_machine
 from backend.machine.model import Machine
 from backend.pipeline.config import Config
 from backend.pipeline.records import Inputs, Snapshot
-from backend.pipeline.step import State, initial, step
+from backend.pipeline.step import initial, step
 from backend.safety.limiter import Decision, Latch, Wish, limit, open_latch
 from backend.safety.limits import Delay
 from backend.safety.partner import Limits as Band
@@ -50,8 +50,7 @@ CLEAR_AT_START = 0.6  # [m]
 @dataclass(frozen=True)
 class Drive:
     """One drive. models: of both machines; limited: whether the limiter is in between; up, down:
-    one-way delays, batching included [s]; loss: share of messages lost; seconds: at most;
-    locks: whether delays above the limit lock motion (a drive that proves the lock turns it off).
+    one-way delays, batching included [s]; loss: share of messages lost; seconds: at most.
     """
 
     seed: int
@@ -137,15 +136,18 @@ def drive(plan: Drive) -> Outcome:
         t = tick * DT
         for one in fleet:
             _obey(one, t)
-            samples += _report(one, t, radios[0], plan, rng)
-        if t >= clock_due - 1e-9:
+            if plan.limited:
+                samples += _report(one, t, radios[0], plan, rng)
+        if plan.limited and t >= clock_due - 1e-9:
             clock_due += 0.5
             # As in the live simulation, the clock is asked past the radio.
             samples += [ClockSample(n, t - 0.002, t - 0.001, t) for n in NAMES]
         if t >= cycle_due - 1e-9:
             cycle_due += CYCLE
-            pipeline, snapshot = step(pipeline, Inputs(tuple(samples)), t, config)
-            samples = []
+            snapshot = None
+            if plan.limited:
+                pipeline, snapshot = step(pipeline, Inputs(tuple(samples)), t, config)
+                samples = []
             for one, stick in zip(fleet, sticks, strict=True):
                 _command(one, stick.at(t), snapshot, t, radios[1], plan, rng, outcome)
         if t >= shown_due - 1e-9:
@@ -243,17 +245,20 @@ def _report(
 def _command(
     one: _Machine,
     sticks: Sticks,
-    snapshot: Snapshot,
+    snapshot: Snapshot | None,
     t: float,
     radio: Radio,
     plan: Drive,
     rng: np.random.Generator,
     outcome: Outcome,
 ) -> None:
-    """One cycle of the operator's side: sticks to a command and motion limits, on the air."""
+    """One cycle of the operator's side: sticks to a command and motion limits, on the air.
+
+    snapshot: None where nothing is limited.
+    """
     wish = Wish(*velocities(one.machine, sticks, Setting()))
     joints, tracks, fraction = wish.joints, wish.tracks, np.ones((len(wish.joints) + 2, 2))
-    if plan.limited:
+    if snapshot is not None:
         pose = snapshot.machines[one.name].pose
         delay = Delay(plan.up, plan.up + plan.down)
         decision = limit(
