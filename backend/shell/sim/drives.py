@@ -155,7 +155,8 @@ def drive(plan: Drive) -> Outcome:
             outcome.path.append((fleet[0].path, fleet[1].path))
             outcome.driven.append((fleet[0].driven, fleet[1].driven))
         if t >= safe_until:
-            touches, apart = contact(*(_bodies(one.machine, one.state) for one in fleet))
+            first, second = (_bodies(m.machine, m.state) for m in fleet)
+            touches, apart = contact(first, second)
             outcome.nearest = min(outcome.nearest, apart)
             if touches:
                 outcome.contact = t
@@ -315,7 +316,7 @@ def _placed(machines: Sequence[Machine], rng: np.random.Generator) -> list[SimSt
             for machine, position in zip(machines, (np.zeros(3), there), strict=True)
         ]
         bodies = [_bodies(m, s) for m, s in zip(machines, states, strict=True)]
-        touches, gap = contact(*bodies)
+        touches, gap = contact(bodies[0], bodies[1])
         if not touches and gap >= CLEAR_AT_START:
             return states
 
