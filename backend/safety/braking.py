@@ -21,7 +21,7 @@ def braking_speed(distance: Array, delay: Array | float, a: Array) -> Array:
     """The greatest v with v T + v^2 / (2 a) <= distance; 0 for a distance of 0 or less."""
     d = np.maximum(distance, 0.0)
     # The larger root, written so that small distances keep their digits.
-    return np.asarray(2.0 * d / (delay + np.sqrt(delay * delay + 2.0 * d / a)))
+    return np.asarray(2.0 * d / np.maximum(delay + np.sqrt(delay * delay + 2.0 * d / a), 1e-300))
 
 
 def accelerations(machine: Machine) -> Array:

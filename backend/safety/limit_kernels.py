@@ -31,13 +31,16 @@ def _slope(value: float) -> float:
 def _farthest(c: float, b: float, room: float) -> float:
     """The greatest s with c s + 1/2 b s^2 <= room, for every smaller s, too."""
     room = max(room, 0.0)
-    if b <= 0.0:
-        return room / c if c > 0.0 else np.inf
-    return (-c + np.sqrt(c * c + 2.0 * b * room)) / b
+    root = np.sqrt(c * c + 2.0 * b * room)
+    if c > 0.0:
+        return 2.0 * room / (c + root)  # keeps its digits for small b
+    return (root - c) / b if b > 0.0 else np.inf
 
 
 @njit(cache=True, nogil=True)
 def _speed(s: float, T: float, a: float) -> float:
+    if s <= 0.0:
+        return 0.0
     return 2.0 * s / (T + np.sqrt(T * T + 2.0 * s / a)) if s < np.inf else np.inf
 
 
@@ -121,7 +124,8 @@ def _part(linear: float, square: float, room: float) -> float:
     """The greatest q in 0..1 with q linear + q^2 square <= room."""
     if linear + square <= room:
         return 1.0
-    room = max(room, 0.0)
+    if room <= 0.0:
+        return 0.0
     return 2.0 * room / (linear + np.sqrt(linear * linear + 4.0 * square * room))
 
 

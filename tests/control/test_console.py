@@ -98,13 +98,14 @@ def test_override_is_held_to_run() -> None:
     assert not run(replace(CALM, override=True), start=run(CALM)).may_move
 
 
+NAMES = (
+    *("lease", "focus", "gamepad", "network", "enable"),
+    *("neutral", "stop", "reset", "pause", "override"),
+)
 EVENTS = st.builds(
     Event,
     time=st.just(0.0),
-    **{
-        name: st.booleans()
-        for name in ("lease focus gamepad network enable neutral stop reset pause override").split()
-    },
+    **{name: st.booleans() for name in NAMES},
 )
 
 

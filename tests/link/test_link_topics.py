@@ -19,8 +19,8 @@ from backend.shell.link.topics import (
     key,
     match,
     topic,
-    topics_markdown,
 )
+from backend.shell.link.topics_table import topics_markdown
 
 FIELDS = {"machine": "left", "link": "boom", "kind": "sun"}
 

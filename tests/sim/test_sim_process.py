@@ -68,6 +68,11 @@ class Cockpit:
         status = self.receiver.statuses().get(self.name)
         return status.mode if status else ""
 
+    @property
+    def swing(self):
+        """True rate [rad/s]."""
+        return self.receiver.truths()[self.name].velocity[0]
+
     def lease(self):
         """Asks for the machine's lease, or refreshes it."""
         kind = Kind.REFRESH if self.token else Kind.REQUEST
@@ -138,8 +143,7 @@ def test_streams_clock_and_commands():
         assert cockpit.mode == "program"
 
         cockpit.until(lambda: cockpit.mode == "remote", each=lambda: cockpit.command(travel=0.2))
-        swing = lambda: cockpit.receiver.truths()["left"].velocity[0]  # noqa: E731
-        cockpit.until(lambda: abs(swing() - 0.3) < 0.02, 5.0, each=cockpit.command)
+        cockpit.until(lambda: abs(cockpit.swing - 0.3) < 0.02, 5.0, each=cockpit.command)
         truth = cockpit.receiver.truths()["left"]
         start = SITE.machine("left").start.position
         assert np.linalg.norm(truth.base - start) > 1e-3  # the tracks turned, too
