@@ -12,6 +12,7 @@ from numba import njit
 from backend.spatial.types import Array, IntArray
 
 APPROACHES = 1e-3  # slopes below this do not count as approaching [m/rad, m/m]
+NEGLIGIBLE = 1e-4  # a motion that uses less room than this until it stands moves away [m]
 BISECTIONS = 12
 STILL = 0.01  # slower motions are taken for standing [rad/s, m/s]
 
@@ -51,8 +52,8 @@ def _beside(v: float, c: float, b: float, room: float, w: float, T: float, a: fl
     """
     low, high = 0.0, v
     for _ in range(BISECTIONS):
-        s = v * T + v * v / (2.0 * a)
-        if _used(c, b, s) + w * (T + v / a) <= room:
+        taken = _used(c, b, v * T + v * v / (2.0 * a))
+        if taken <= NEGLIGIBLE or taken + w * (T + v / a) <= room:
             low = v
         else:
             high = v
@@ -160,7 +161,9 @@ def together(
             d = 1.0 if wish[k] > 0.0 else -1.0
             c, b = _slope(-d * slope[r, k]), max(-bend[r, k, k], 0.0)
             used[k] = _used(c, b, s[k])
-            if used[k] > 0.0:
+            if used[k] <= NEGLIGIBLE:
+                used[k] = 0.0
+            else:
                 # c < 0: c q s + 1/2 b q^2 s^2 <= q^2 (c s + 1/2 b s^2) for q in 0..1.
                 linear += max(c, 0.0) * s[k]
                 square += used[k] - max(c, 0.0) * s[k]

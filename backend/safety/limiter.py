@@ -23,7 +23,7 @@ LOCKED_ABOVE = 0.4
 OVERRIDE_FRACTION = 0.15
 """Share of full speed that an override allows where a concern allows less."""
 STANDING = 0.01
-"""Share of full speed below which a limited motion counts as brought to zero."""
+"""Share of full speed below which a limited motion is brought to zero."""
 SUPERVISOR = "supervisor"
 
 
@@ -133,7 +133,9 @@ def limit(
     cut: dict[int, Cause] = {}
     if override is None:
         speed, cut = at_once(machine, speed, found)
-    shut = shut | _brought_to_zero(asked, speed, full, causes, cut)
+    standing = (np.abs(speed) < STANDING * full) & (np.abs(speed) < np.abs(asked))
+    speed = np.where(standing, 0.0, speed)
+    shut = shut | _closed(asked, standing, causes, cut)
     return Decision(
         joints=speed[:n],
         tracks=speed[n:],
@@ -155,15 +157,14 @@ def _locked(delay: Delay) -> str:
     )
 
 
-def _brought_to_zero(
-    asked: Array, speed: Array, full: Array, causes: list[list[Cause]], cut: dict[int, Cause]
+def _closed(
+    asked: Array, standing: BoolArray, causes: list[list[Cause]], cut: dict[int, Cause]
 ) -> BoolArray:
     """(m, 2) directions that are asked for and that a concern has brought to a stand.
 
     The end of a joint's travel is none: there is nothing to approach there.
     """
     shut = np.zeros((len(asked), 2), dtype=bool)
-    standing = (np.abs(speed) < STANDING * full) & (np.abs(speed) < np.abs(asked))
     for k in np.flatnonzero(standing):
         side = int(asked[k] > 0.0)
         shut[k, side] = k in cut or causes[k][side].concern not in ("", "end")

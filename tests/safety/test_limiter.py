@@ -219,6 +219,17 @@ def test_a_swing_that_starts_sideways_and_comes_closer_is_seen() -> None:
     assert decide({0: -1.0}, concern(part)).joints[0] > -0.7 * FULL[0]
 
 
+@given(st.floats(-0.5, 0.5), st.floats(0.0, 2.0), st.floats(0.0, 4.0))
+def test_moving_away_is_free_however_the_partner_comes(room, w, b) -> None:
+    """At full speed as long as the stop still ends farther away; else as far as it moves away."""
+    part = approach(row(room, {0: 2.0}, w, {(0, 0): -b}))
+    v = decide({0: 1.0}, concern(part)).joints[0]
+    s = v * T[0] + v * v / (2 * A[0])
+    full = FULL[0] * T[0] + FULL[0] ** 2 / (2 * A[0])
+    assert s >= min(full, 0.99 * 2 * 2.0 / max(b, 1e-9))
+    assert -2.0 * s + 0.5 * b * s * s <= max(SHARE * room, 0.0) + 1e-3
+
+
 def test_two_joints_together_come_closer_than_each_alone() -> None:
     part = approach(row(1.0, {0: -0.5, 1: -0.5}, 0.0, {(0, 1): -4.0}))
     alone = decide({0: 1.0}, concern(part)).joints[0]
