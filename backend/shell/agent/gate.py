@@ -49,7 +49,7 @@ class Gate:
         said = self.command
         return (
             said is not None
-            and 0.0 <= now - self.heard_at < min(said.time_to_live, TIME_TO_LIVE)
+            and now - self.heard_at < min(said.time_to_live, TIME_TO_LIVE)
             and self.lease.admits(said.token, now)
         )
 
@@ -58,7 +58,7 @@ class Gate:
         said = self.limits
         return (
             said is not None
-            and 0.0 <= now - self.limits_at < min(said.time_to_live, LIMITS_TIME_TO_LIVE)
+            and now - self.limits_at < min(said.time_to_live, LIMITS_TIME_TO_LIVE)
             and self.lease.admits(said.token, now)
         )
 

@@ -54,7 +54,7 @@ def decide(
 ) -> Stood:
     """What to ask of the machine at `now` [s], dt [s] after `last`."""
     nothing = at_rest(machine)
-    if reading is None or not 0.0 <= now - reading.time <= BLIND:
+    if reading is None or not now - reading.time <= BLIND:
         return nothing
     if not gate.obeys(now):
         mode = "hold" if last.mode == "hold" else "stopped"
@@ -115,9 +115,9 @@ def run_agent(
     before = clock()
     try:
         while not until.is_set():
-            now = clock()
             gate = ear.hear(gate, name, machine)
             reading = driver.read()
+            now = clock()
             last = decide(gate, machine, reading, last, now, min(now - before, 2.0 * PERIOD))
             if last.mode == "remote":
                 driver.write(last.joints, last.tracks)
