@@ -39,7 +39,7 @@ ROOMS: dict[str, set[str]] = {
     "backend.shell": {"backend"},
     "backend.warm": {
         *("backend.pipeline", "backend.cspace", "backend.collision", "backend.machine"),
-        "backend.spatial",
+        *("backend.safety", "backend.spatial"),
     },
     "cockpit": {"backend", "cockpit"},
 }

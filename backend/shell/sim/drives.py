@@ -11,6 +11,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
+from typing import Protocol
 
 import numpy as np
 
@@ -104,8 +105,11 @@ class _Machine:
     driven: float = 0.0
 
 
-def drive(plan: Drive) -> Outcome:
-    """Runs one drive until its end or the first contact."""
+def drive(plan: Drive, hands: Sequence[Hands] | None = None) -> Outcome:
+    """Runs one drive until its end or the first contact.
+
+    hands: of both operators, careless ones when None.
+    """
     site = load_site("demo")
     site = replace(site, sim=site.sim.model_copy(update={"joint_period": DT}))
     rng = np.random.default_rng((plan.seed, 7))
@@ -127,7 +131,7 @@ def drive(plan: Drive) -> Outcome:
         drive=plan.limited,
     )
     radios = Radio(site.sim.radio_period, plan.down), Radio(site.sim.radio_period, plan.up)
-    sticks = [Careless(np.random.default_rng((plan.seed, k))) for k in range(2)]
+    sticks = hands or [Careless(np.random.default_rng((plan.seed, k))) for k in range(2)]
     outcome, pipeline = Outcome(), initial(config)
     fastest = sum(_fastest(m) for m in machines)
     safe_until = clock_due = shown_due = cycle_due = 0.0
@@ -164,6 +168,12 @@ def drive(plan: Drive) -> Outcome:
             # Nothing touches before the machines could have come together at their fastest.
             safe_until = t + apart / fastest
     return outcome
+
+
+class Hands(Protocol):
+    """An operator's hands."""
+
+    def at(self, t: float) -> Sticks: ...
 
 
 class Careless:
