@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 PORT ?= 8000
 
-.PHONY: demo test check install install-dev browser campaign bench lock format clean
+.PHONY: demo test check install install-dev browser campaign bench golden lock format clean
 
 demo: install
 	$(BIN)/cockpit demo --port $(PORT)
@@ -57,6 +57,10 @@ UV_COMPILE = uv pip compile --universal --python-version 3.11 --generate-hashes 
 lock:
 	$(UV_COMPILE) pyproject.toml requirements-build.in -o requirements.lock
 	$(UV_COMPILE) pyproject.toml requirements-build.in --extra dev -c requirements.lock -o requirements-dev.lock
+
+# What the shipped sessions lead to, written anew on purpose: look at the diff before committing.
+golden: install-dev
+	$(BIN)/python tests/golden_replay.py
 
 clean:
 	rm -rf .venv artifacts

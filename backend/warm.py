@@ -10,6 +10,7 @@ from rich.progress import track
 
 from backend.collision.closest import closest_pairs
 from backend.cspace.driving import driving_zone, turning_zone
+from backend.cspace.joint_bars import joint_bar
 from backend.cspace.joint_image import certified4, joint4
 from backend.cspace.margins import margins
 from backend.cspace.reach_image import reach_image
@@ -47,6 +48,7 @@ def compile_kernels() -> None:
     free = certified4(machine, layers, 0.1, (3, 3, 3, 3)).certified_free()
     regions(free, (0, 0, 0, 0), wraps=True)
     reach_image(machine, q, layers, (4, 4))
+    joint_bar(machine, q, 0, np.array([-1.0, 1.0]), 4, layers, 0.1, np.full(len(q), 0.01))
     for base in (np.eye(4), tilted):
         driving_zone(machine, q, base, near, 0.1)
         turning_zone(machine, q, base, near, eta=0.1)

@@ -27,8 +27,10 @@ from backend.spatial import rotation, transform
 from cockpit.bench_cspace import cspace_rows
 from cockpit.bench_input import cycles
 from cockpit.bench_live import crowded_rows, live_rows
+from cockpit.bench_recording import recording_rows
 from cockpit.bench_rows import percentile_rows
-from cockpit.station import load_models, make_config
+from cockpit.bench_session import session_rows
+from cockpit.desk import load_models, make_config
 
 CYCLES = 500
 
@@ -43,6 +45,8 @@ def run_bench(as_json: bool, seconds: float) -> None:
         ("fast loop and images", lambda: pipeline_rows(site, config)),
         ("distances", lambda: distance_rows(next(iter(models.values())))),
         ("joint images", cspace_rows),
+        ("recording", lambda: recording_rows(site, config, seconds)),
+        ("a session of an hour", lambda: session_rows(site, config, seconds)),
         ("live, over Zenoh", lambda: live_rows(seconds)),
         ("live, on a crowded site", lambda: crowded_rows(seconds)),
     ]

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 import time
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 
@@ -48,42 +50,64 @@ def cspace_rows() -> list[BenchRow]:
 def _image_rows(
     scene: BenchScene, model: ArmModel, shape: tuple[int, int, int, int], target: float, count: int
 ) -> list[BenchRow]:
-    """The exact image's time as a multiple of filling the same bits, in turns."""
+    """The exact image's time as a multiple of filling the same bits, in turns.
+
+    Three kinds of memory: the same again and again, as much of it as fits in the processor's
+    caches; known to the system, but in no cache, which takes turns among more than the caches hold;
+    and new, which the system has to find first, as it has to for a new image.
+    """
     grid = joint_grid(scene.machine, shape)
     bits = blocked(model, grid, scene.partner)
-    memory = np.zeros_like(bits)
-    ours, peer = _in_turns(
+    known = [np.zeros_like(bits) for _ in range(2 + 2 * last_cache() // bits.nbytes)]
+    for memory in known:
+        memory.fill(1)  # mapped from now on
+    ours, over, again, cold, new = _in_turns(
         count,
-        lambda: blocked(model, grid, scene.partner),
-        lambda: memory.fill(0),
+        lambda _: blocked(model, grid, scene.partner),
+        lambda k: blocked(model, grid, scene.partner, out=known[k % len(known)]),
+        lambda _: known[0].fill(0),
+        lambda k: known[(k + len(known) // 2) % len(known)].fill(0),
+        lambda _: np.empty_like(bits).fill(0),
     )
-    _, new = _in_turns(count, lambda: None, lambda: np.empty_like(bits).fill(0))
     name = f"exact image, {scene.name}, {_size(shape)}"
-    multiples, of_new = ours / np.median(peer), ours / np.median(new)
-    return [
+    rows = [
         BenchRow(
             name=name,
             value=float(np.median(1e3 * ours)),
             unit="ms",
             spread=_spread(1e3 * ours),
             peer="memset",
-            peer_value=float(np.median(1e3 * peer)),
-        ),
-        BenchRow(
-            name=f"{name}, of memset",
-            value=float(np.median(multiples)),
-            unit="x",
-            spread=_spread(multiples),
-            target=target,
-        ),
-        BenchRow(
-            name=f"{name}, of memset of a new image, as ours is",
-            value=float(np.median(of_new)),
-            unit="x",
-            spread=_spread(of_new),
-        ),
-        _share_row(f"colliding cells, {scene.name}, {_size(shape)}", _share(bits, grid)),
+            peer_value=float(np.median(1e3 * again)),
+        )
     ]
+    for what, times, peer, limit in (
+        ("of memset", ours, again, target),
+        ("written over known memory out of cache, of memset of such", over, cold, None),
+        ("of memset of a new image, as ours is", ours, new, None),
+    ):
+        multiples = times / np.median(peer)
+        rows.append(
+            BenchRow(
+                name=f"{name}, {what}",
+                value=float(np.median(multiples)),
+                unit="x",
+                spread=_spread(multiples),
+                target=limit,
+                peer="memset",
+                peer_value=float(np.median(1e3 * peer)),
+            )
+        )
+    colliding = f"colliding cells, {scene.name}, {_size(shape)}"
+    return [*rows, _share_row(colliding, _share(bits, grid))]
+
+
+def last_cache() -> int:
+    """Size of the largest cache of the first processor [bytes]; 64 MiB where it is not told."""
+    sizes = []
+    for path in Path("/sys/devices/system/cpu/cpu0/cache").glob("index*/size"):
+        number, unit = re.fullmatch(r"(\d+)([KMG]?)", path.read_text().strip()).groups()
+        sizes.append(int(number) << {"": 0, "K": 10, "M": 20, "G": 30}[unit])
+    return max(sizes, default=64 << 20)
 
 
 def _fcl_rows(scene: BenchScene, model: ArmModel) -> list[BenchRow]:
@@ -129,8 +153,8 @@ def _certified_rows(scene: BenchScene, model: ArmModel) -> list[BenchRow]:
     grown = arm_model(scene.machine, inflation=ETA)
     ours, exact = _in_turns(
         9,
-        lambda: [blocked(model, grid, scene.partner, kind) for kind in (OUTER, INNER)],
-        lambda: blocked(model, grid, scene.partner, EXACT),
+        lambda _: [blocked(model, grid, scene.partner, kind) for kind in (OUTER, INNER)],
+        lambda _: blocked(model, grid, scene.partner, EXACT),
     )
     multiples = ours / np.median(exact)
     small, fine = (_undecided(scene, model, model, shape) for shape in (SMALL, FINE))
@@ -159,17 +183,15 @@ def _undecided(
     return _share(bits, grid)
 
 
-def _in_turns(
-    count: int, ours: Callable[[], object], peer: Callable[[], object]
-) -> tuple[np.ndarray, np.ndarray]:
-    """Durations (count,) of each [s], after one run that does not count."""
-    times = np.empty((2, count + 1))
+def _in_turns(count: int, *works: Callable[[int], object]) -> np.ndarray:
+    """Durations (works, count) [s], after one run that does not count; each is told its turn."""
+    times = np.empty((len(works), count + 1))
     for k in range(count + 1):
-        for row, work in enumerate((ours, peer)):
+        for row, work in enumerate(works):
             start = time.perf_counter()
-            work()
+            work(k)
             times[row, k] = time.perf_counter() - start
-    return times[0, 1:], times[1, 1:]
+    return times[:, 1:]
 
 
 def _share(bits: AnyArray, grid: JointGrid) -> float:

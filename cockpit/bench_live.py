@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -161,9 +162,10 @@ def _listen(url: str, seconds: float) -> list[tuple[float, dict]]:
 @contextlib.contextmanager
 def _backend(endpoint: str, site: str) -> Iterator[tuple[subprocess.Popen[str], str]]:
     """`cockpit serve` on a free port; yields the process and its websocket's address."""
+    recordings = tempfile.mkdtemp()
     command = [
         *(sys.executable, "-m", "cockpit.cli", "serve", "--site", site, "--port", "0"),
-        *("--no-browser", "--listen", endpoint),
+        *("--no-browser", "--listen", endpoint, "--record", recordings),
     ]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     try:
@@ -176,6 +178,7 @@ def _backend(endpoint: str, site: str) -> Iterator[tuple[subprocess.Popen[str], 
         yield process, f"ws://{found[1]}/ws"
     finally:
         _end(process)
+        shutil.rmtree(recordings, ignore_errors=True)
 
 
 @contextlib.contextmanager

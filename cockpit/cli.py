@@ -12,6 +12,9 @@ from typing import Annotated
 import typer
 
 from backend.errors import InputError
+from cockpit.cli_formats import convert, export
+from cockpit.cli_playback import add_commands
+from cockpit.cli_recordings import recordings
 
 app = typer.Typer(
     name="cockpit",
@@ -36,6 +39,12 @@ Connect = Annotated[
     list[str] | None, typer.Option(help="Zenoh endpoint to connect to: a router, another backend.")
 ]
 
+NoRecord = Annotated[bool, typer.Option("--no-record", help="Record nothing.")]
+Record = Annotated[
+    Path | None,
+    typer.Option(help="Folder of all recordings; default: the site file's, or the user's state."),
+]
+
 
 @app.command()
 def demo(
@@ -43,11 +52,21 @@ def demo(
     host: Host = "127.0.0.1",
     port: Port = 8000,
     no_browser: NoBrowser = False,
+    no_record: NoRecord = False,
+    record: Record = None,
 ) -> None:
     """Run a site with simulated machines, each in its own process, and open the page."""
     from cockpit.run import run_demo
 
-    run_demo(site, host, port, open_browser=not no_browser, until=_interrupted())
+    run_demo(
+        site,
+        host,
+        port,
+        open_browser=not no_browser,
+        until=_interrupted(),
+        recording=not no_record,
+        record=record,
+    )
 
 
 @app.command()
@@ -61,6 +80,8 @@ def serve(
     machines: Annotated[
         str, typer.Option(help="Machines this backend answers for, e.g. left,right; default all.")
     ] = "",
+    no_record: NoRecord = False,
+    record: Record = None,
 ) -> None:
     """Run the cockpit on live machines, which publish to the Zenoh endpoint it listens on."""
     from cockpit.run import run_serve
@@ -75,6 +96,8 @@ def serve(
         connect=tuple(connect or ()),
         own=own,
         until=_interrupted(),
+        recording=not no_record,
+        record=record,
     )
 
 
@@ -203,12 +226,34 @@ def bench(
     run_bench(json_, seconds)
 
 
+@app.command()
+def recover(
+    path: Annotated[Path, typer.Argument(help="A cut or damaged .mcap file, or a recording.")],
+    out: Annotated[
+        Path | None, typer.Option(help="The .mcap file to write; default: beside the original.")
+    ] = None,
+    json_: Annotated[bool, typer.Option("--json", help="Print JSON instead of words.")] = False,
+) -> None:
+    """Write a whole file of what can be read of a damaged recording; the original stays."""
+    from cockpit.recover import run_recover
+
+    run_recover(path, out, json_)
+
+
+app.add_typer(recordings, name="recordings")
+app.command()(convert)
+app.command()(export)
+
+
 def _interrupted() -> threading.Event:
     """Set by Ctrl-C or SIGTERM."""
     event = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: event.set())
     return event
+
+
+add_commands(app, _interrupted)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -8,7 +8,6 @@ import subprocess
 import sys
 import threading
 import time
-import webbrowser
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -16,6 +15,7 @@ from backend.errors import InputError
 from backend.machine.model import Machine
 from backend.shell.link.session import with_port
 from backend.site.site import Site, load_site
+from cockpit.announce import announce
 
 LOOPBACK = "tcp/127.0.0.1:0"
 LIVE = "tcp/127.0.0.1:7447"
@@ -24,7 +24,13 @@ SETTLE = 6.0
 
 
 def run_demo(
-    site_name: str, host: str, port: int, open_browser: bool, until: threading.Event
+    site_name: str,
+    host: str,
+    port: int,
+    open_browser: bool,
+    until: threading.Event,
+    recording: bool = True,
+    record: Path | None = None,
 ) -> None:
     """Simulated machines, one process each, and a backend, until interrupted."""
     from cockpit.station import Options, Station
@@ -34,13 +40,13 @@ def run_demo(
     began = [float("inf")]
     station = Station(
         site,
-        Options(host, port, (endpoint,), (), (), "DEMO"),
+        Options(host, port, (endpoint,), (), (), "DEMO", record, recording),
         demo_began=(lambda: began[0]) if tells_a_story(site) else None,
     )
     with contextlib.closing(station):
         began[0] = time.time() + SETTLE
         with _machines(site_name, site, endpoint, began[0]) as processes:
-            _announce(site, station.web.port, host, open_browser)
+            announce(site, station.web.port, host, open_browser)
             print(f"Simulated machines talk to {endpoint}.", flush=True)
             gone: set[str] = set()
             while not until.wait(0.5):
@@ -69,6 +75,8 @@ def run_serve(
     connect: tuple[str, ...],
     own: tuple[str, ...],
     until: threading.Event,
+    recording: bool = True,
+    record: Path | None = None,
 ) -> None:
     """The cockpit on live machines, until interrupted."""
     from cockpit.station import Options, Station
@@ -77,9 +85,9 @@ def run_serve(
     listen = listen or site.link.listen or (() if connect or site.link.connect else (LIVE,))
     listen = tuple(with_port(endpoint) for endpoint in listen)
     connect = connect or site.link.connect
-    station = Station(site, Options(host, port, listen, connect, own, "LIVE"))
+    station = Station(site, Options(host, port, listen, connect, own, "LIVE", record, recording))
     with contextlib.closing(station):
-        _announce(site, station.web.port, host, open_browser)
+        announce(site, station.web.port, host, open_browser)
         where = [f"listening on {e}" for e in listen] + [f"connected to {e}" for e in connect]
         print(f"Machines: {', '.join(where)}.", flush=True)
         until.wait()
@@ -156,20 +164,3 @@ def _machines(
                 process.wait(timeout=3.0)
             except subprocess.TimeoutExpired:
                 process.kill()
-
-
-def _announce(site: Site, port: int, host: str, open_browser: bool) -> None:
-    shown = "127.0.0.1" if host in ("", "0.0.0.0", "::") else host
-    url = f"http://{shown}:{port}"
-    print(f"{site.title}: {url}", flush=True)
-    if not open_browser:
-        return
-    has_screen = sys.platform in ("darwin", "win32") or any(
-        os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY")
-    )
-    opened = False
-    if has_screen:
-        with contextlib.suppress(webbrowser.Error):
-            opened = webbrowser.open(url)
-    if not opened:
-        print(f"No browser could be opened here: open {url} yourself.", flush=True)

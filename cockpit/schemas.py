@@ -8,20 +8,32 @@ from pydantic import BaseModel
 
 from backend.documents.assessment import AssessmentDocument
 from backend.documents.bench import BenchDocument
+from backend.documents.conversion import ConversionDocument, ExportDocument
 from backend.documents.cspace import CspaceDocument
+from backend.documents.recordings import RecordingsDocument, RecoverDocument
+from backend.documents.session import DiffDocument, SeriesDocument, SessionDocument
 from backend.documents.state import StateDocument
 from backend.errors import InputError
 from backend.shell.app.models import HealthModel, SiteModel, SnapshotModel
+from backend.shell.app.recording import RecordingModel
 from backend.site.tables import SiteTable
 
 SCHEMAS: dict[str, tuple[type[BaseModel], str]] = {
     "state": (StateDocument, "machine states, read by assess"),
     "assess": (AssessmentDocument, "what assess prints"),
     "cspace": (CspaceDocument, "what cspace --json prints"),
+    "convert": (ConversionDocument, "what convert --json prints"),
+    "export": (ExportDocument, "what export --json prints"),
     "bench": (BenchDocument, "what bench --json prints"),
+    "recordings": (RecordingsDocument, "what recordings --json prints"),
+    "recover": (RecoverDocument, "what recover --json prints"),
+    "recording": (RecordingModel, "/api/recording"),
     "snapshot": (SnapshotModel, "/api/snapshot and the Zenoh key cockpit/snapshot"),
     "site": (SiteModel, "/api/site"),
     "health": (HealthModel, "/api/health"),
+    "session": (SessionDocument, "/api/session"),
+    "series": (SeriesDocument, "/api/session/series"),
+    "diff": (DiffDocument, "what diff --json prints, and /api/session/diff"),
     "site-file": (SiteTable, "a site file, as TOML"),
 }
 

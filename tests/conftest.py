@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import shutil
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -14,6 +17,14 @@ __all__ = ["watch"]
 
 ROOT = Path(__file__).resolve().parents[1]
 SHARED = ROOT.parent / "shared" / "data"
+
+# Before any program under test starts: none may record into the home of who runs the tests.
+RECORDINGS = tempfile.mkdtemp(prefix="cockpit-recordings-")
+os.environ["EXCAVATOR_COCKPIT_RECORDINGS"] = RECORDINGS
+
+
+def pytest_sessionfinish() -> None:
+    shutil.rmtree(RECORDINGS, ignore_errors=True)
 
 
 @pytest.fixture(scope="session")

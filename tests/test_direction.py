@@ -49,6 +49,7 @@ LIBRARIES: dict[str, str | tuple[str, ...]] = {
     "zenoh": "backend.shell.link",
     "rosbags": "backend.shell",
     "mcap": "backend.shell.session",
+    "zstandard": "backend.shell.session",
     "can": ("backend.shell.session", "backend.shell.agent"),
     "cantools": ("backend.shell.session", "backend.shell.agent"),
     "pyarrow": "backend.shell.session",

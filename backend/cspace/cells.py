@@ -68,14 +68,18 @@ def _model(machine: ByIdentity[Machine], rest: tuple[float, ...], steps: int) ->
     return arm_model(machine.value, q, ETA_STEP * steps)
 
 
-def coded(models: CellModels, grid: JointGrid, layers: Mapping[str, Boxes]) -> AnyArray:
-    """uint8 (swing, boom, stick, bucket) of a grid. layers: "partner", "site" in the root frame."""
+def coded(
+    models: CellModels, grid: JointGrid, layers: Mapping[str, Boxes], together: Boxes | None = None
+) -> AnyArray:
+    """uint8 (swing, boom, stick, bucket) of a grid. layers: "partner", "site" in the root frame;
+    together: all of their boxes, when they are at hand.
+    """
     cells = np.zeros(grid.shape, dtype=np.uint8)
     for name, boxes in layers.items():
         if len(boxes):
             _mark(cells, blocked(models.built, grid, boxes), LAYER_BITS[name])
     _mark(cells, self_blocked(models.built, grid), SELF)
-    everything = concatenated(layers.values())
+    everything = concatenated(layers.values()) if together is None else together
     inner = blocked(models.built, grid, everything, INNER) | self_blocked(models.built, grid, INNER)
     outer = blocked(models.grown, grid, everything, OUTER)
     outer |= self_blocked(models.built, grid, OUTER, models.slack)

@@ -16,7 +16,7 @@ from numba import njit
 
 from backend.cspace.exact_boxes import gap
 from backend.cspace.exact_levels import EXACT, RUN, Level
-from backend.cspace.exact_slices import placed, slices
+from backend.cspace.exact_slices import slices
 from backend.cspace.planar_arm import Profiles
 from backend.cspace.rows import ALL, Polygons, rectangle_distance, touched
 from backend.cspace.rows_batch import SIZE, Batch, new_batch, touched_rows
@@ -24,11 +24,14 @@ from backend.spatial.types import AnyArray, Array, BoolArray
 
 
 class Chain(NamedTuple):
-    """pivots: (3, 2) of boom, stick and bucket at joint values 0; reach: (3,) of their bodies from
+    """T_arm_root: (3, 4) at swing 0; links: (3, 2) the boom's pivot, and from pivot to pivot at
+    joint values 0; pivots: (3, 2) of boom, stick and bucket there; reach: (3,) of their bodies from
     the boom's pivot [m]. Boxes of the bodies in the frame `arm` at joint values 0, for those whose
     prism is not exact: centers (n, 3), rotations (n, 3, 3), halves (n, 3), askew (n,).
     """
 
+    T_arm_root: Array
+    links: Array
     pivots: Array
     reach: Array
     centers: Array
@@ -107,7 +110,6 @@ def _finish(
     p: int,
     boxes: tuple[Array, Array, Array],
     level: Level,
-    kind: int,
     batch: Batch,
     count: int,
     full: AnyArray,
@@ -115,9 +117,7 @@ def _finish(
     out: AnyArray,
 ) -> None:
     """Write the rows of a batch to out (m, words); those that are full now are done."""
-    count = touched_rows(
-        body, b, polygons, p, level.step, level.cells, level.turn, batch, count, full
-    )
+    count = touched_rows(body, b, polygons, p, level, batch, count, full)
     for r in range(count):
         row = out[batch.place[r]]
         if batch.doubt[r] < 0.0:
@@ -126,7 +126,7 @@ def _finish(
                 body, b, polygons, p, batch.x[r], batch.z[r], batch.origin[r], level.step,
                 level.cells, batch.margin[r], level.turn, batch.blocked[:, r],
             )  # fmt: skip
-        if kind == EXACT and chain.askew[b]:
+        if level.kind == EXACT and chain.askew[b]:
             _keep_box(chain, group, b, boxes, polygons.obstacle[p], level, batch, r, full, row)
         every = True
         for w in range(len(row)):
@@ -144,7 +144,6 @@ def _rows(
     pairs: BoolArray,
     boxes: tuple[Array, Array, Array],
     level: Level,
-    kind: int,
     done: BoolArray,
     batch: Batch,
     full: AnyArray,
@@ -156,7 +155,7 @@ def _rows(
     for turn in range(2):
         for b in range(len(body.group)):
             # Boxes that are not prisms are dear: they come last, and only for what is still free.
-            late = kind == EXACT and chain.askew[b]
+            late = level.kind == EXACT and chain.askew[b]
             if body.group[b] != group or body.sides[b] == 0 or late != (turn == 1):
                 continue
             within = body.reach[b] + level.widest
@@ -179,16 +178,19 @@ def _rows(
                             continue
                         batch.x[count], batch.z[count], batch.place[count] = x, z, m
                         batch.origin[count], batch.margin[count] = level.origin[m], level.margin[m]
+                        if level.kind != EXACT:
+                            batch.lever_x[count] = level.lever_x[m]
+                            batch.lever_z[count] = level.lever_z[m]
                         count += 1
                         if count == SIZE:
                             _finish(
-                                chain, group, b, body, polygons, p, boxes, level, kind, batch,
+                                chain, group, b, body, polygons, p, boxes, level, batch,
                                 count, full, done, out,
                             )  # fmt: skip
                             count = 0
                 if count > 0:
                     _finish(
-                        chain, group, b, body, polygons, p, boxes, level, kind, batch, count, full,
+                        chain, group, b, body, polygons, p, boxes, level, batch, count, full,
                         done, out,
                     )  # fmt: skip
 
@@ -205,35 +207,33 @@ def _pass_on(
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _swing_block(
+def swing_block(
     chain: Chain,
     body: Profiles,
-    obstacles: tuple[Array, Array, Array],
+    boxes: tuple[Array, Array, Array],
     pairs: BoolArray,
-    T: Array,
-    boom: Level,
-    stick: Level,
-    bucket: Level,
-    kind: int,
+    level: tuple[Level, Level, Level],
     spread: float,
     out: AnyArray,
 ) -> None:
-    """One swing of the image. out: (boom * stick, words)."""
-    boxes = placed(obstacles, T)
-    polygons = slices(body, boxes, pairs, kind, spread, chain.pivots[0], chain.reach)
+    """One swing of an image. boxes: obstacles in the frame `arm` of that swing; spread: half a cell
+    of the swing [rad]; out: (boom * stick, words), 0.
+    """
+    boom, stick, bucket = level
+    polygons = slices(body, boxes, pairs, boom.kind, spread, chain.pivots[0], chain.reach)
     if len(polygons.slab) == 0:
         return
     full1, full2, full3 = full_words(boom.cells), full_words(stick.cells), full_words(bucket.cells)
     corners = polygons.x.shape[1]
     row1, done1 = np.zeros((1, len(full1)), np.uint64), np.zeros(1, np.bool_)
     _rows(
-        chain, 0, body, polygons, pairs, boxes, boom, kind, done1, new_batch(len(full1), corners),
+        chain, 0, body, polygons, pairs, boxes, boom, done1, new_batch(len(full1), corners),
         full1, row1,
     )  # fmt: skip
     rows2, done2 = np.zeros((boom.cells, len(full2)), np.uint64), np.zeros(boom.cells, np.bool_)
     _pass_on(row1[0], boom.cells, 1, full2, done2, rows2)
     _rows(
-        chain, 1, body, polygons, pairs, boxes, stick, kind, done2, new_batch(len(full2), corners),
+        chain, 1, body, polygons, pairs, boxes, stick, done2, new_batch(len(full2), corners),
         full2, rows2,
     )  # fmt: skip
     done3 = np.zeros(len(out), np.bool_)
@@ -241,40 +241,6 @@ def _swing_block(
     for i in range(boom.cells):
         _pass_on(rows2[i], n, 1, full3, done3[i * n : (i + 1) * n], out[i * n : (i + 1) * n])
     _rows(
-        chain, 2, body, polygons, pairs, boxes, bucket, kind, done3, new_batch(len(full3), corners),
+        chain, 2, body, polygons, pairs, boxes, bucket, done3, new_batch(len(full3), corners),
         full3, out,
     )  # fmt: skip
-
-
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def image_kernel(
-    chain: Chain,
-    body: Profiles,
-    boxes: tuple[Array, Array, Array],
-    pairs: BoolArray,
-    T_arm_root: Array,
-    boom: Level,
-    stick: Level,
-    bucket: Level,
-    kind: int,
-    spread: float,
-    base: BoolArray,
-    first: int,
-    every: int,
-    out: AnyArray,
-) -> None:
-    """Fill the swings first, first + every, ... of out (swing, boom * stick, words), which must be
-    0, with the blocked cells. Without the GIL, so that threads can share the swings.
-
-    boxes: obstacles in the root frame, centers (m, 3), rotations (m, 3, 3), halves (m, 3); pairs:
-    (n, m) which body must not touch which obstacle; T_arm_root: (swing, 3, 4); base: (swing,)
-    where everything is blocked; spread: half a cell of the swing [rad].
-    """
-    full = full_words(bucket.cells)
-    for s in range(first, len(out), every):
-        if base[s]:
-            out[s] = full
-        else:
-            _swing_block(
-                chain, body, boxes, pairs, T_arm_root[s], boom, stick, bucket, kind, spread, out[s]
-            )  # fmt: skip

@@ -6,12 +6,13 @@ swing: they are computed once for an image.
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 
-from backend.cspace.planar_arm import PlanarArm
-from backend.spatial.types import AnyArray, Array
+from backend.spatial.types import Array
 
 EXACT, OUTER, INNER = 0, 1, -1
 """Cells at their centres; all that is not surely free; only what is surely blocked."""
@@ -22,32 +23,37 @@ ROUNDING = 1e-9
 RUN = 16
 """Rows that are looked at together before each for itself."""
 
-
-class Axis(NamedTuple):
-    """Cells of a joint: n cells at start + i step [rad], as angles in the arm's plane; `half` of
-    a cell [rad], 0 where the value is exact.
-    """
-
-    start: float
-    step: float
-    n: int
-    half: float
+START, STEP, COUNT, HALF = 0, 1, 2, 3
+"""Columns of axes (4, 4), a row for each joint: `count` cells at start + i step, as angles in the
+arm's plane; `half` of a cell, 0 where the value is exact [rad]."""
 
 
 class Level(NamedTuple):
     """The rows of one joint: for the boom 1, for the stick one for each cell of the boom, for the
     bucket one for each cell of boom and stick.
 
-    x, z: (m,) pivots [m]; origin: (m,) angles of the first cells [rad]; margin: (m,) how far a
-    pivot can be from there [m]; turn: how far the angle can be from its cell's [rad]; both below 0
-    for INNER. step, cells: of the rows. widest: the largest margin; low, high: (runs, 2) bounds of
-    the pivots of RUN rows.
+    kind: EXACT, OUTER, INNER; x, z: (m,) pivots [m]; origin: (m,) angles of the first cells [rad];
+    margin: (m,) how far a pivot can be from there [m]; turn: how far the angle can be from its
+    cell's [rad]; both below 0 for INNER. step, cells: of the rows. widest: the largest margin; low,
+    high: (runs, 2) bounds of the pivots of RUN rows.
+
+    Along one direction a pivot moves less than in all: the boom turns it by up to `boom` about
+    (boom_x, boom_z), the stick by up to `stick` about a point that is (lever_x, lever_z), (m,),
+    behind it, () when EXACT; bend: what the paths' curvature adds at most [m].
     """
 
+    kind: int
     x: Array
     z: Array
     origin: Array
     margin: Array
+    lever_x: Array
+    lever_z: Array
+    boom_x: float
+    boom_z: float
+    boom: float
+    stick: float
+    bend: float
     turn: float
     step: float
     cells: int
@@ -56,36 +62,86 @@ class Level(NamedTuple):
     high: Array
 
 
-def levels(arm: PlanarArm, axes: tuple[Axis, Axis, Axis], kind: int) -> tuple[Level, Level, Level]:
-    """Boom, stick and bucket. axes: the cells of each."""
-    boom, stick, bucket = axes
-    l1, l2 = np.hypot(*arm.boom), np.hypot(*arm.stick)
-    angle1: Array = boom.start + boom.step * np.arange(boom.n, dtype=float)
-    angle2: Array = stick.start + stick.step * np.arange(stick.n, dtype=float)
-    v1 = np.exp(1j * angle1) * complex(*arm.boom)
-    v2 = (np.exp(1j * angle1)[:, None] * np.exp(1j * angle2)) * complex(*arm.stick)
-    at0 = np.array([complex(*arm.pivot)])
-    at1 = at0 + v1
-    at2 = (at1[:, None] + v2).ravel()
-    # The boom turns the stick's pivot about its own, and the bucket's; the stick that one too.
-    margin1 = np.full(boom.n, l1 * boom.half)
-    margin2 = ((np.abs(v1[:, None] + v2) + l2 * stick.half) * boom.half + l2 * stick.half).ravel()
-    sum2 = (angle1[:, None] + angle2).ravel()
-    half2 = boom.half + stick.half
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def levels(links: Array, axes: Array, kind: int) -> tuple[Level, Level, Level]:
+    """Boom, stick and bucket. links: (3, 2) the boom's pivot, and from pivot to pivot at joint
+    values 0 [m]; axes: (4, 4) see START.
+    """
+    n1, n2 = int(axes[1, COUNT]), int(axes[2, COUNT])
+    half1, half2, half3 = axes[1, HALF], axes[2, HALF], axes[3, HALF]
+    ox, oz = links[0, 0], links[0, 1]
+    l1, l2 = math.hypot(links[1, 0], links[1, 1]), math.hypot(links[2, 0], links[2, 1])
+    rows = n1 * n2
+    x0, z0, origin0, margin0 = (
+        np.full(1, ox),
+        np.full(1, oz),
+        np.full(1, axes[1, START]),
+        np.empty(1),
+    )
+    x1, z1, origin1, margin1 = np.empty(n1), np.empty(n1), np.empty(n1), np.empty(n1)
+    x2, z2, origin2, margin2 = np.empty(rows), np.empty(rows), np.empty(rows), np.empty(rows)
+    lever_x, lever_z = (
+        np.empty(rows if kind != EXACT else 0),
+        np.empty(rows if kind != EXACT else 0),
+    )
+    u2 = np.empty((n2, 2))
+    for j in range(n2):
+        angle = axes[2, START] + axes[2, STEP] * j
+        c, s = math.cos(angle), math.sin(angle)
+        u2[j, 0] = c * links[2, 0] - s * links[2, 1]
+        u2[j, 1] = s * links[2, 0] + c * links[2, 1]
+    margin0[0] = kind * ROUNDING
+    for i in range(n1):
+        angle = axes[1, START] + axes[1, STEP] * i
+        c, s = math.cos(angle), math.sin(angle)
+        vx, vz = c * links[1, 0] - s * links[1, 1], s * links[1, 0] + c * links[1, 1]
+        x1[i], z1[i] = ox + vx, oz + vz
+        origin1[i] = axes[2, START] + angle
+        margin1[i] = kind * (l1 * half1 + ROUNDING)
+        for j in range(n2):
+            k = i * n2 + j
+            wx, wz = c * u2[j, 0] - s * u2[j, 1], s * u2[j, 0] + c * u2[j, 1]
+            x2[k], z2[k] = x1[i] + wx, z1[i] + wz
+            origin2[k] = axes[3, START] + (angle + (axes[2, START] + axes[2, STEP] * j))
+            if kind == EXACT:
+                margin2[k] = 0.0
+                continue
+            # The boom turns the stick's pivot about its own, and the bucket's; the stick that one.
+            away = math.hypot(vx + wx, vz + wz) + l2 * half2
+            margin2[k] = kind * (away * half1 + l2 * half2 + ROUNDING)
+            lever_x[k], lever_z[k] = wx, wz
+    none = np.zeros(n1 if kind != EXACT else 0)
+    bend1 = 0.5 * l1 * half1 * half1 + ROUNDING
+    bend2 = 0.5 * (l1 + l2) * half1 * half1 + l2 * half2 * (half1 + 0.5 * half2) + ROUNDING
+    low0, high0, _ = _runs(x0, z0, margin0)
+    low1, high1, widest1 = _runs(x1, z1, margin1)
+    low2, high2, widest2 = _runs(x2, z2, margin2)
+    turn1, turn2 = kind * (half1 + ROUNDING), kind * (half1 + half2 + ROUNDING)
+    turn3 = kind * (half1 + half2 + half3 + ROUNDING)
     return (
-        _level(at0, boom.start + np.zeros(1), np.zeros(1), boom.half, boom, kind),
-        _level(at1, stick.start + angle1, margin1, half2, stick, kind),
-        _level(at2, bucket.start + sum2, margin2, half2 + bucket.half, bucket, kind),
-    )
+        Level(
+            kind, x0, z0, origin0, margin0, np.zeros(1), np.zeros(1), ox, oz, 0.0, 0.0, ROUNDING,
+            turn1, axes[1, STEP], n1, max(margin0[0], 0.0), low0, high0,
+        ),
+        Level(
+            kind, x1, z1, origin1, margin1, none, none, ox, oz, half1, 0.0, bend1,
+            turn2, axes[2, STEP], n2, widest1, low1, high1,
+        ),
+        Level(
+            kind, x2, z2, origin2, margin2, lever_x, lever_z, ox, oz, half1, half2, bend2,
+            turn3, axes[3, STEP], int(axes[3, COUNT]), widest2, low2, high2,
+        ),
+    )  # fmt: skip
 
 
-def _level(at: AnyArray, origin: Array, margin: Array, turn: float, axis: Axis, kind: int) -> Level:
-    x, z = at.real.copy(), at.imag.copy()
-    margin = kind * (margin + ROUNDING)
-    starts = np.arange(0, len(x), RUN)
-    low = np.stack([np.minimum.reduceat(v, starts) for v in (x, z)], axis=1)
-    high = np.stack([np.maximum.reduceat(v, starts) for v in (x, z)], axis=1)
-    turn = kind * (turn + ROUNDING)
-    return Level(
-        x, z, origin, margin, turn, axis.step, axis.n, max(float(margin.max()), 0.0), low, high
-    )
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _runs(x: Array, z: Array, margin: Array) -> tuple[Array, Array, float]:
+    """Bounds (runs, 2) of every RUN pivots, and the largest margin, at least 0."""
+    count = (len(x) + RUN - 1) // RUN
+    low, high, widest = np.full((count, 2), math.inf), np.full((count, 2), -math.inf), 0.0
+    for k in range(len(x)):
+        r = k // RUN
+        low[r, 0], high[r, 0] = min(low[r, 0], x[k]), max(high[r, 0], x[k])
+        low[r, 1], high[r, 1] = min(low[r, 1], z[k]), max(high[r, 1], z[k])
+        widest = max(widest, margin[k])
+    return low, high, widest

@@ -3,65 +3,114 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
 from numba import njit
 
 from backend.cspace.exact_boxes import gap
-from backend.machine.kinematics import link_poses
+from backend.cspace.ground import GROUND
 from backend.machine.model import Machine
-from backend.spatial.boxes import Boxes
+from backend.spatial.boxes import Boxes, concatenated
 from backend.spatial.types import Array, BoolArray, IntArray
 
-_BATCH = 4096
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _link_poses(M: Array, parents: IntArray, joints: IntArray, q: Array, T: Array) -> None:
+    """Set T (L, 3, 4) to the links' poses in the root frame; parents come before their links."""
+    moved = np.empty((3, 4))
+    for i in range(len(parents)):
+        s = v = 0.0
+        if joints[i] >= 0:
+            s, v = math.sin(q[joints[i]]), 1.0 - math.cos(q[joints[i]])
+        for a in range(3):
+            for b in range(4):
+                moved[a, b] = M[0, i, a, b] + s * M[1, i, a, b] + v * M[2, i, a, b]
+        if parents[i] < 0:
+            T[i] = moved
+            continue
+        P = T[parents[i]]
+        for a in range(3):
+            for b in range(4):
+                T[i, a, b] = P[a, 0] * moved[0, b] + P[a, 1] * moved[1, b] + P[a, 2] * moved[2, b]
+            T[i, a, 3] += P[a, 3]
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _place(
+    T: Array, own: tuple[Array, Array, Array], links: IntArray, centers: Array, rotations: Array
+) -> None:
+    """Bodies at the links' poses T, in the root frame."""
+    for i in range(len(links)):
+        P = T[links[i]]
+        for a in range(3):
+            centers[i, a] = P[a, 3]
+            for b in range(3):
+                centers[i, a] += P[a, b] * own[0][i, b]
+                rotations[i, a, b] = (
+                    P[a, 0] * own[1][i, 0, b]
+                    + P[a, 1] * own[1][i, 1, b]
+                    + P[a, 2] * own[1][i, 2, b]
+                )
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _hits(
-    T: Array,
+    chain: tuple[Array, IntArray, IntArray],
+    q: Array,
     own: tuple[Array, Array, Array],
     links: IntArray,
     others: tuple[Array, Array, Array],
-    self_pairs: IntArray,
+    first: IntArray,
     counts: BoolArray,
+    self_pairs: IntArray,
     against: BoolArray,
     itself: BoolArray,
 ) -> None:
-    """T: (k, L, 4, 4); own in the links' frames, others in the root frame; counts: (n,) own bodies
-    that others matter to; sets against, itself.
+    """chain: Machine.link_matrices, .link_parents, .link_joints; q: (k, n); own in the links'
+    frames; others in the root frame, those of layer l from first[l] to first[l + 1]; counts:
+    (layers, n) own bodies that a layer matters to; sets against (layers, k), itself (k,).
     """
     n, m = len(links), len(others[0])
     centers, rotations = np.empty((n, 3)), np.empty((n, 3, 3))
+    T = np.empty((len(chain[1]), 3, 4))
     size, other_size = np.empty(n), np.empty(m)
     for i in range(n):
         size[i] = math.sqrt((own[2][i] ** 2).sum())
     for j in range(m):
         other_size[j] = math.sqrt((others[2][j] ** 2).sum())
-    for c in range(len(T)):
-        for i in range(n):
-            pose = T[c, links[i]]
+    low, high = np.full((len(against), 3), math.inf), np.full((len(against), 3), -math.inf)
+    for layer in range(len(against)):
+        for j in range(first[layer], first[layer + 1]):
             for a in range(3):
-                centers[i, a] = pose[a, 3]
-                for b in range(3):
-                    centers[i, a] += pose[a, b] * own[0][i, b]
-                    total = 0.0
-                    for k in range(3):
-                        total += pose[a, k] * own[1][i, k, b]
-                    rotations[i, a, b] = total
-        for i in range(n):
-            for j in range(m):
-                if against[c] or not counts[i]:
-                    break
-                d = 0.0
-                for a in range(3):
-                    d += (centers[i, a] - others[0][j, a]) ** 2
-                if d > (size[i] + other_size[j]) ** 2:
+                low[layer, a] = min(low[layer, a], others[0][j, a] - other_size[j])
+                high[layer, a] = max(high[layer, a], others[0][j, a] + other_size[j])
+    for c in range(len(q)):
+        _link_poses(chain[0], chain[1], chain[2], q[c], T)
+        _place(T, own, links, centers, rotations)
+        for layer in range(len(against)):
+            for i in range(n):
+                if against[layer, c] or not counts[layer, i]:
                     continue
-                g = gap(
-                    centers[i], rotations[i], own[2][i],
-                    others[0][j], others[1][j], others[2][j], 0.0,
-                )  # fmt: skip
-                against[c] = g <= 0.0
+                away = 0.0
+                for a in range(3):
+                    x = centers[i, a]
+                    away += max(low[layer, a] - x, 0.0, x - high[layer, a]) ** 2
+                if away > size[i] ** 2:
+                    continue
+                for j in range(first[layer], first[layer + 1]):
+                    d = 0.0
+                    for a in range(3):
+                        d += (centers[i, a] - others[0][j, a]) ** 2
+                    if d > (size[i] + other_size[j]) ** 2:
+                        continue
+                    g = gap(
+                        centers[i], rotations[i], own[2][i],
+                        others[0][j], others[1][j], others[2][j], 0.0,
+                    )  # fmt: skip
+                    if g <= 0.0:
+                        against[layer, c] = True
+                        break
         for p in range(len(self_pairs)):
             i, j = self_pairs[p, 0], self_pairs[p, 1]
             d = 0.0
@@ -77,35 +126,41 @@ def _hits(
                 break
 
 
-def touching(
-    machine: Machine,
-    q: Array,
-    obstacles: Boxes,
-    standing: bool = False,
-    ask_itself: bool = True,
-) -> tuple[BoolArray, BoolArray]:
+def touching(machine: Machine, q: Array, obstacles: Boxes) -> tuple[BoolArray, BoolArray]:
     """(touches an obstacle, touches itself), each (k,), at q (k, n) [rad]; bodies as built.
 
-    obstacles in the machine's root frame; standing: the tracks stand on them, which does not count;
-    ask_itself: False leaves the second answer at False.
+    obstacles in the machine's root frame.
     """
-    q = np.asarray(q, dtype=float)
-    against, itself = np.zeros(len(q), dtype=bool), np.zeros(len(q), dtype=bool)
-    itself_pairs = machine.self_pairs if ask_itself else ()
-    pairs = np.array(itself_pairs, dtype=np.int64).reshape(-1, 2)
-    own = (
-        machine.bodies.centers.copy(),
-        machine.bodies.rotations.copy(),
-        machine.bodies.half_extents.copy(),
+    against, itself = touching_layers(machine, q, {"": obstacles})
+    return against[""], itself
+
+
+def touching_layers(
+    machine: Machine, q: Array, layers: Mapping[str, Boxes]
+) -> tuple[dict[str, BoolArray], BoolArray]:
+    """(which layers are touched, touches itself), each (k,), at q (k, n) [rad]; bodies as built.
+
+    layers in the machine's root frame; the tracks stand on the layer "ground": that does not count.
+    """
+    q = np.ascontiguousarray(q, dtype=float)
+    against = np.zeros((len(layers), len(q)), dtype=bool)
+    itself = np.zeros(len(q), dtype=bool)
+    arm: BoolArray = np.asarray(machine.body_joints.any(axis=1), dtype=bool)
+    counts = [arm if name == GROUND else np.ones_like(arm) for name in layers]
+    _hits(
+        (machine.link_matrices, machine.link_parents, machine.link_joints),
+        q,
+        _arrays(machine.bodies),
+        machine.body_link_index,
+        _arrays(concatenated(layers.values())),
+        np.cumsum([0, *map(len, layers.values())], dtype=np.int64),
+        np.array(counts, dtype=bool).reshape(-1, len(arm)),
+        machine.self_pair_index,
+        against,
+        itself,
     )
-    others = (
-        obstacles.centers.copy(),
-        obstacles.rotations.copy(),
-        obstacles.half_extents.copy(),
-    )
-    counts = machine.body_joints.any(axis=1) | (not standing)
-    for start in range(0, len(q), _BATCH):
-        part = slice(start, start + _BATCH)
-        T = link_poses(machine, q[part])
-        _hits(T, own, machine.body_link_index, others, pairs, counts, against[part], itself[part])
-    return against, itself
+    return dict(zip(layers, against, strict=True)), itself
+
+
+def _arrays(boxes: Boxes) -> tuple[Array, Array, Array]:
+    return boxes.centers.copy(), boxes.rotations.copy(), boxes.half_extents.copy()

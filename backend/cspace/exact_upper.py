@@ -1,4 +1,4 @@
-"""Whether a body that turns with the swing, or does not turn at all, touches obstacles."""
+"""Whether bodies that turn about z touch obstacles: at an angle, or throughout a cell of angles."""
 
 from __future__ import annotations
 
@@ -8,16 +8,17 @@ import numpy as np
 from numba import njit
 
 from backend.cspace.exact_boxes import gap
-from backend.spatial.boxes import Boxes
-from backend.spatial.types import Array, BoolArray
+from backend.spatial.types import Array, IntArray
 
 DEPTH = 6
-"""A swing cell is halved at most this often before it stays undecided."""
-_PAD = 1e-9
+"""A cell is halved at most this often before it stays undecided."""
+
+PAD = 1e-9
+"""[m] more than the kernels round."""
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _turned_gap(
+def turned_gap(
     center: Array,
     R: Array,
     half: Array,
@@ -46,21 +47,21 @@ def _turned_gap(
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _decide(
+def decided(
     own: tuple[Array, Array, Array],
     others: tuple[Array, Array, Array],
-    pairs: BoolArray,
+    pairs: IntArray,
     radius: Array,
     angle: float,
     half_cell: float,
     colliding: bool,
-    depth: int,
 ) -> bool:
     """With `colliding`: whether some pair surely touches at every angle of the cell. Without:
-    whether some pair may touch at some angle.
+    whether some pair may touch at some angle. pairs: (k, 2) own body, obstacle; radius: (own,) of
+    the bodies about the axis [m].
     """
-    stack = np.empty((depth + 2, 3))
-    stack[0, 0], stack[0, 1], stack[0, 2] = angle, half_cell, depth
+    stack = np.empty((DEPTH + 2, 3))
+    stack[0, 0], stack[0, 1], stack[0, 2] = angle, half_cell, DEPTH
     size = 1
     while size > 0:
         size -= 1
@@ -69,23 +70,23 @@ def _decide(
         chord = 2.0 * math.sin(0.5 * min(half, math.pi))
         sure, maybe = False, False
         cos, sin = math.cos(middle), math.sin(middle)
-        for i in range(len(own[0])):
-            moved = radius[i] * chord + _PAD
-            for j in range(len(others[0])):
-                if sure or not pairs[i, j]:
-                    continue
-                g = _turned_gap(
-                    own[0][i], own[1][i], own[2][i], others[0][j], others[1][j], others[2][j],
-                    cos, sin, moved,
-                )  # fmt: skip
-                sure = sure or g < -moved
-                maybe = maybe or g <= moved
+        for k in range(len(pairs)):
+            i, j = pairs[k, 0], pairs[k, 1]
+            moved = radius[i] * chord + PAD
+            g = turned_gap(
+                own[0][i], own[1][i], own[2][i], others[0][j], others[1][j], others[2][j],
+                cos, sin, moved,
+            )  # fmt: skip
+            sure = g < -moved
+            maybe = maybe or g <= moved
+            if sure:
+                break
         if sure or not maybe:
             # One part settles it, unless it is what every part must be.
             if sure != colliding:
                 return not colliding
             continue
-        if left == 0.0:
+        if left == 0.0 or half == 0.0:
             return not colliding
         for side in (-0.5, 0.5):
             stack[size, 0], stack[size, 1] = middle + side * half, 0.5 * half
@@ -95,57 +96,24 @@ def _decide(
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _states(
+def turned_touches(
     own: tuple[Array, Array, Array],
     others: tuple[Array, Array, Array],
-    pairs: BoolArray,
+    pairs: IntArray,
     radius: Array,
-    angles: Array,
+    angle: float,
     half_cell: float,
     kind: int,
-    depth: int,
-) -> BoolArray:
-    out = np.zeros(len(angles), np.bool_)
-    for s in range(len(angles)):
-        if kind != 0:
-            out[s] = _decide(own, others, pairs, radius, angles[s], half_cell, kind < 0, depth)
-            continue
-        cos, sin = math.cos(angles[s]), math.sin(angles[s])
-        for i in range(len(own[0])):
-            for j in range(len(others[0])):
-                if pairs[i, j] and not out[s]:
-                    g = _turned_gap(
-                        own[0][i], own[1][i], own[2][i], others[0][j], others[1][j], others[2][j],
-                        cos, sin, 0.0,
-                    )  # fmt: skip
-                    out[s] = g <= 0.0
-    return out
-
-
-def touching_swings(
-    own: Boxes,
-    obstacles: Boxes,
-    pairs: BoolArray,
-    angles: Array,
-    half_cell: float = 0.0,
-    kind: int = 0,
-) -> BoolArray:
-    """(n,) whether boxes that turn about z by `angles` (n,) [rad] touch obstacles.
-
-    Both in one frame with z the swing axis. kind: 0 at the angles themselves; 1 whether they may
-    touch somewhere within half_cell [rad] of an angle; -1 whether they surely touch at each angle
-    within it. pairs: (own, obstacles) which count.
-    """
-    corners = own.corners()
-    radius = np.hypot(corners[:, :, 0], corners[:, :, 1]).max(axis=1, initial=0.0)
-    found = _states(
-        (own.centers, own.rotations, own.half_extents),
-        (obstacles.centers, obstacles.rotations, obstacles.half_extents),
-        np.ascontiguousarray(pairs),
-        radius,
-        np.ascontiguousarray(angles, dtype=float),
-        float(half_cell),
-        kind,
-        DEPTH,
-    )
-    return np.asarray(found, dtype=bool)
+) -> bool:
+    """Whether some pair touches: at the angle for kind 0, as `decided` for 1 (may), -1 (must)."""
+    if kind != 0:
+        return bool(decided(own, others, pairs, radius, angle, half_cell, kind < 0))
+    cos, sin = math.cos(angle), math.sin(angle)
+    for k in range(len(pairs)):
+        i, j = pairs[k, 0], pairs[k, 1]
+        g = turned_gap(
+            own[0][i], own[1][i], own[2][i], others[0][j], others[1][j], others[2][j], cos, sin, 0.0
+        )  # fmt: skip
+        if g <= 0.0:
+            return True
+    return False

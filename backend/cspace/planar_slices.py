@@ -205,12 +205,18 @@ def inner_slice(
 ) -> int:
     """Polygon inside the slices of a box (8, 3) at all swings of the cell, in front of the axis.
 
-    Take (x, z) in the slices at both ends of the cell. The segment between the two points of the
-    box crosses the slab at every swing between, where its x has moved by at most
-    `shift` = x (1 - cos 2 spread) + |t| sin 2 spread. So a point whose neighbours at x - shift and
-    x + shift are in both slices is, by convexity, in all of them.
+    Take a point (x, z), x >= 0, of the slices at both ends of the cell, s = spread from its middle:
+    the box has points there with lateral coordinates t and u. The segment between them meets the
+    plane of the swing d at (1 - k) : k with (1 - k) sin(s + d) = k sin(s - d), where its lateral
+    coordinate is (1 - k) t cos(s + d) + k u cos(s - d), in the slab when t and u are in the slab
+    narrowed by cos 2s, and its x is x cos s / cos d + m (t - u) with 0 <= m <= sin(s) / 2. So a
+    point with such neighbours to the left and to the right is, by convexity, in all slices.
     """
-    planes = np.array([[0.0, 1.0, high], [0.0, -1.0, -low]])
+    if spread >= 0.25 * math.pi:
+        return 0
+    narrow = math.cos(2.0 * spread)
+    lowest, highest = max(low, low / narrow), min(high, high / narrow)
+    planes = np.array([[0.0, 1.0, highest], [0.0, -1.0, -lowest]])
     turned = np.empty((8, 3))
     x, z = np.empty((2, POINTS)), np.empty((2, POINTS))
     sizes = np.zeros(2, np.int64)
@@ -227,18 +233,18 @@ def inner_slice(
         sizes[end] = convex_hull(points[:n, 0].copy(), points[:n, 2].copy(), n, x[end], z[end])
         if sizes[end] < 3:
             return 0
-    wide = max(abs(low), abs(high))
-    largest = min(x[0, : sizes[0]].max(), x[1, : sizes[1]].max())
-    shift = max(largest, 0.0) * (1.0 - math.cos(2.0 * spread)) + wide * math.sin(2.0 * spread)
+    largest = max(min(x[0, : sizes[0]].max(), x[1, : sizes[1]].max()), 0.0)
+    left = 0.5 * math.sin(spread) * (highest - lowest)
+    right = (left + largest * (1.0 - math.cos(spread))) / math.cos(spread)
     n = sizes[0]
     out_x[:n], out_z[:n] = x[0, :n], z[0, :n]
-    n = cut_polygon(out_x, out_z, n, -1.0, 0.0, -(wide * math.tan(spread) + shift))
+    n = cut_polygon(out_x, out_z, n, -1.0, 0.0, -left)
     for end in range(2):
         for i in range(sizes[end]):
             j = i + 1 if i + 1 < sizes[end] else 0
             a = z[end, j] - z[end, i]
             b = x[end, i] - x[end, j]
-            c = a * x[end, i] + b * z[end, i] - abs(a) * shift
+            c = a * x[end, i] + b * z[end, i] - (a * right if a > 0.0 else -a * left)
             n = cut_polygon(out_x, out_z, n, a, b, c)
             if n < 3:
                 return 0

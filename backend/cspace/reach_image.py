@@ -8,14 +8,13 @@ from enum import IntEnum
 
 import numpy as np
 
-from backend.cspace.exact_points import touching
-from backend.cspace.ground import GROUND
+from backend.cspace.exact_points import touching_layers
 from backend.machine import inverse
 from backend.machine.kinematics import end_point
 from backend.machine.model import Machine
 from backend.machine.sun_map import sun_angles
 from backend.spatial import transform
-from backend.spatial.boxes import NO_BOXES, Boxes
+from backend.spatial.boxes import Boxes
 from backend.spatial.types import AnyArray, Array, BoolArray
 
 SELF = "self"
@@ -87,30 +86,31 @@ def reach_image(
     z = float(p_now[2]) if height is None else float(height)
 
     # The inverse takes a point; where the tip stands beside the arm's plane, its direction from the
-    # axis differs from the arm's by the same angle that the inverse takes off again.
-    S, D = np.meshgrid(swing, reach, indexing="ij")
+    # axis differs from the arm's by the same angle that the inverse takes off again. What it gives
+    # for boom, stick and bucket is the same in every direction.
     lateral = machine.arm.tip_lateral
-    beside = np.arctan2(lateral, np.sqrt(np.maximum(D**2 - lateral**2, 0.0)))
-    azimuth = machine.sun.azimuth_sign * S + machine.sun.azimuth_offset + beside
-    p_swing = np.stack([D * np.cos(azimuth), D * np.sin(azimuth), np.full_like(D, z)], axis=-1)
-    p_root = transform.apply(machine.arm.T_root_swing, p_swing)
-    solution = inverse.inverse(machine, p_root, attitude, elbow)
-    configurations = solution.q.copy()
-    configurations[..., 0] = S
-    configurations[..., 4:] = q[4:]
+    beside = np.arctan2(lateral, np.sqrt(np.maximum(reach**2 - lateral**2, 0.0)))
+    azimuth = machine.sun.azimuth_sign * swing[0] + machine.sun.azimuth_offset + beside
+    p_swing = np.stack(
+        [reach * np.cos(azimuth), reach * np.sin(azimuth), np.full_like(reach, z)], axis=-1
+    )
+    solution = inverse.inverse(
+        machine, transform.apply(machine.arm.T_root_swing, p_swing), attitude, elbow
+    )
+    arm = solution.q.copy()
+    arm[:, 4:] = q[4:]
+    configurations = np.repeat(arm[None], len(swing), axis=0)
+    configurations[..., 0] = swing[:, None]
 
-    state = np.full(S.shape, ReachState.FREE, dtype=np.uint8)
-    joints = configurations[..., 1:]
-    slack = np.minimum(joints - machine.lower[1:], machine.upper[1:] - joints).min(axis=-1)
-    state[~(slack >= -1e-9)] = ReachState.BEYOND_LIMIT
-    state[~solution.reachable] = ReachState.OUT_OF_REACH
+    slack = np.minimum(arm[:, 1:] - machine.lower[1:], machine.upper[1:] - arm[:, 1:]).min(axis=1)
+    state = np.full((len(swing), len(reach)), ReachState.FREE, dtype=np.uint8)
+    state[:, ~(slack >= -1e-9)] = ReachState.BEYOND_LIMIT
+    state[:, ~solution.reachable] = ReachState.OUT_OF_REACH
     asked = state == ReachState.FREE
-    hit = {name: np.zeros(S.shape, dtype=bool) for name in (*layers, SELF)}
-    for name, boxes in (*layers.items(), (SELF, NO_BOXES)):
-        against, itself = touching(
-            machine, configurations[asked], boxes, name == GROUND, name == SELF
-        )
-        hit[name][asked] = itself if name == SELF else against
+    hit = {name: np.zeros(state.shape, dtype=bool) for name in (*layers, SELF)}
+    against, itself = touching_layers(machine, configurations[asked], layers)
+    for name, found in (*against.items(), (SELF, itself)):
+        hit[name][asked] = found
     state[np.any(list(hit.values()), axis=0)] = ReachState.COLLIDING
-    near = solution.reachable & (slack < NEAR)
+    near = np.repeat((solution.reachable & (slack < NEAR))[None], len(swing), axis=0)
     return ReachImage(swing, reach, swing_edges, reach_edges, state, hit, near, z, attitude, elbow)

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from backend.cspace.exact_levels import EXACT, Level
 from backend.cspace.planar_arm import Profiles
 from backend.cspace.rows import ALL, SLACK, Polygons
 from backend.cspace.rows_angles import ERROR
@@ -35,6 +36,7 @@ from backend.cspace.rows_vector import (
     mark,
     narrow,
     offsets,
+    offsets_within,
     without,
 )
 from backend.spatial.types import AnyArray, Array, IntArray
@@ -48,15 +50,17 @@ class Batch(NamedTuple):
     """Rows of one body and one polygon, and room to work.
 
     x, z: (m,) pivots [m]; origin: (m,) angles of the first cells [rad]; margin: (m,) how far the
-    pivots can be from there [m]; place: (m,) which rows of the image they are; blocked, mask:
-    (words, m); doubt: (m,) distance of an arc's end from a cell, in cells; work: (9, m); corners:
-    (2, v, m) one over their distances, directions.
+    pivots can be from there [m]; lever_x, lever_z: (m,) see Level; place: (m,) which rows of the
+    image they are; blocked, mask: (words, m); doubt: (m,) distance of an arc's end from a cell, in
+    cells; work: (9, m); corners: (2, v, m) one over their distances, directions.
     """
 
     x: Array
     z: Array
     origin: Array
     margin: Array
+    lever_x: Array
+    lever_z: Array
     place: IntArray
     blocked: AnyArray
     mask: AnyArray
@@ -69,8 +73,8 @@ class Batch(NamedTuple):
 def new_batch(words: int, corners: int) -> Batch:
     """An empty batch for rows of `words` and polygons of up to `corners`."""
     return Batch(
-        np.empty(SIZE), np.empty(SIZE), np.empty(SIZE), np.empty(SIZE),
-        np.empty(SIZE, np.int64), np.empty((words, SIZE), np.uint64),
+        np.empty(SIZE), np.empty(SIZE), np.empty(SIZE), np.empty(SIZE), np.zeros(SIZE),
+        np.zeros(SIZE), np.empty(SIZE, np.int64), np.empty((words, SIZE), np.uint64),
         np.empty((words, SIZE), np.uint64), np.empty(SIZE), np.empty((9, SIZE)),
         np.empty((2, corners, SIZE)),
     )  # fmt: skip
@@ -82,9 +86,7 @@ def touched_rows(
     b: int,
     polygons: Polygons,
     k: int,
-    step: float,
-    cells: int,
-    turn: float,
+    level: Level,
     batch: Batch,
     count: int,
     full: AnyArray,
@@ -93,16 +95,16 @@ def touched_rows(
     below 0 where that is not sure. Rows with none are dropped from the first `count`; how many are
     left. full: (words,) the cells that count.
     """
-    close = ERROR / abs(step)
+    close = ERROR / abs(level.step)
     n = _fill(batch, count)
     batch.blocked[:, :n] = ALL
     batch.doubt[:n] = math.inf
     batch.work[0, :n] = math.inf
-    front = _beyond_polygon(body, b, polygons, k, step, cells, turn, batch, n)
+    front = _beyond_polygon(body, b, polygons, k, level, batch, n)
     count = _kept(batch, count, full, close)
     if count == 0:
         return 0
-    _beyond_body(body, b, polygons, k, step, cells, turn, batch, _fill(batch, count), front)
+    _beyond_body(body, b, polygons, k, level, batch, _fill(batch, count), front)
     nearest, inside = batch.work[0], body.depth[b] <= 0.0
     for r in range(count):
         within = inside and nearest[r] >= 0.0  # the pivot lies in both
@@ -125,6 +127,7 @@ def _kept(batch: Batch, count: int, full: AnyArray, close: float) -> int:
             continue
         batch.x[kept], batch.z[kept], batch.place[kept] = batch.x[r], batch.z[r], batch.place[r]
         batch.origin[kept], batch.margin[kept] = batch.origin[r], batch.margin[r]
+        batch.lever_x[kept], batch.lever_z[kept] = batch.lever_x[r], batch.lever_z[r]
         batch.doubt[kept], batch.work[0, kept] = batch.doubt[r], batch.work[0, r]
         for w in range(len(full)):
             batch.blocked[w, kept] = batch.blocked[w, r]
@@ -139,6 +142,7 @@ def _fill(batch: Batch, count: int) -> int:
     for r in range(count, n):
         batch.x[r], batch.z[r] = batch.x[0], batch.z[0]
         batch.origin[r], batch.margin[r] = batch.origin[0], batch.margin[0]
+        batch.lever_x[r], batch.lever_z[r] = batch.lever_x[0], batch.lever_z[0]
     return n
 
 
@@ -154,16 +158,14 @@ def _beyond_polygon(
     b: int,
     polygons: Polygons,
     k: int,
-    step: float,
-    cells: int,
-    turn: float,
+    level: Level,
     batch: Batch,
     n: int,
 ) -> int:
     """Clear `blocked` where an edge of the polygon separates, and lower work[0] to the distances of
     the edges' lines. Bits of the edges that some pivot is in front of.
     """
-    depth = body.depth[b] + SLACK
+    depth, turn, step, cells = body.depth[b] + SLACK, level.turn, level.step, level.cells
     nearest, c, half, center = (
         batch.work[0, :n], batch.work[1, :n], batch.work[2, :n], batch.work[3, :n]
     )  # fmt: skip
@@ -172,10 +174,13 @@ def _beyond_polygon(
     center[:] = -batch.origin[:n]
     front = 0
     for i in range(polygons.sides[k]):
-        offsets(
-            batch.x[:n], batch.z[:n], margin, polygons.normal_x[k, i], polygons.normal_z[k, i],
-            polygons.offset[k, i], c,
-        )  # fmt: skip
+        nx, nz = polygons.normal_x[k, i], polygons.normal_z[k, i]
+        offsets(batch.x[:n], batch.z[:n], nx, nz, polygons.offset[k, i], c)
+        if level.kind != EXACT:
+            offsets_within(
+                batch.x[:n], batch.z[:n], margin, batch.lever_x[:n], batch.lever_z[:n], nx, nz,
+                level.boom_x, level.boom_z, level.boom, level.stick, level.bend, level.kind, c,
+            )  # fmt: skip
         lower(nearest, c)
         lowest = least(c)
         if lowest < before:
@@ -202,9 +207,7 @@ def _beyond_body(
     b: int,
     polygons: Polygons,
     k: int,
-    step: float,
-    cells: int,
-    turn: float,
+    level: Level,
     batch: Batch,
     n: int,
     front: int,
@@ -212,7 +215,7 @@ def _beyond_body(
     """Clear `blocked` where an edge of the body separates. front: edges of the polygon that some
     pivot is in front of; only their corners bound what a line beyond the pivot separates.
     """
-    edges = polygons.sides[k]
+    edges, turn, step, cells = polygons.sides[k], level.turn, level.step, level.cells
     x, z, mask, doubt = batch.x[:n], batch.z[:n], batch.mask, batch.doubt[:n]
     e, half, center = batch.work[1, :n], batch.work[2, :n], batch.work[3, :n]
     ux, uz, middle, low, high = (
@@ -227,8 +230,8 @@ def _beyond_body(
     # Beyond an edge that passes behind the pivot, any corner of the polygon may be the last; and
     # seen from inside of the polygon, all of them show that no line separates.
     corners = front | front << 1 | front >> (edges - 1)
-    smallest = least(batch.margin[:n])
-    behind = body.offset[b, : body.sides[b]].min() + smallest <= -SLACK
+    smallest = min(least(batch.margin[:n]), 0.0)
+    behind = body.offset[b, : body.sides[b]].min() + least(batch.margin[:n]) <= -SLACK
     if behind or greatest(batch.work[0, :n]) >= smallest - SLACK:
         corners = -1
     for v in range(edges):

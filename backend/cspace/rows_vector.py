@@ -62,12 +62,36 @@ def higher(values: Array, others: Array) -> None:
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def offsets(
-    x: Array, z: Array, margin: Array, nx: float, nz: float, offset: float, out: Array
-) -> None:
-    """Distance of the line n . x = offset from the pivots along its normal, and the margin."""
+def offsets(x: Array, z: Array, nx: float, nz: float, offset: float, out: Array) -> None:
+    """Distance of the line n . x = offset from the pivots along its normal."""
     for r in range(len(out)):
-        out[r] = offset - nx * x[r] - nz * z[r] + margin[r]
+        out[r] = offset - nx * x[r] - nz * z[r]
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def offsets_within(
+    x: Array,
+    z: Array,
+    margin: Array,
+    lever_x: Array,
+    lever_z: Array,
+    nx: float,
+    nz: float,
+    boom_x: float,
+    boom_z: float,
+    boom: float,
+    stick: float,
+    bend: float,
+    sign: int,
+    out: Array,
+) -> None:
+    """Move distances along n by how far the pivots can be from where they are, see Level: along n,
+    R(d) v - v is at most |d (n x v)| + d^2 |v| / 2. sign: of the margins.
+    """
+    for r in range(len(out)):
+        by_boom = boom * abs(nz * (x[r] - boom_x) - nx * (z[r] - boom_z))
+        by_stick = stick * abs(nz * lever_x[r] - nx * lever_z[r])
+        out[r] += sign * min(by_boom + by_stick + bend, sign * margin[r])
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]

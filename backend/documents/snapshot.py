@@ -41,6 +41,10 @@ def snapshot_document(snapshot: Snapshot, config: Config) -> dict[str, Any]:
         },
         "concerns": [_concern(c, config.machines[c.machine]) for c in snapshot.concerns],
         "alarms": [_alarm(alarm, config) for alarm in snapshot.alarms],
+        "notices": [
+            {"key": notice.key, "line": notice.line, "since": notice.since}
+            for notice in snapshot.notices
+        ],
         "images": {
             key: {
                 "state_time": stamp.state_time,

@@ -13,7 +13,7 @@ import numpy as np
 
 from backend.cspace.cells import COLLIDING, FREE, CellModels, cell_models, coded
 from backend.cspace.exact import JointGrid
-from backend.cspace.joint_bars import joint_bar
+from backend.cspace.joint_bars import joint_bars
 from backend.cspace.reach_image import ReachImage, reach_image
 from backend.cspace.regions import cell_of
 from backend.fusion.inflation import joint_slack
@@ -22,7 +22,7 @@ from backend.machine.stopping import full_stopping_distances, stopping_distances
 from backend.pipeline.config import Config
 from backend.pipeline.records import Snapshot
 from backend.pipeline.surroundings import growth, surroundings_of, why_unknown
-from backend.spatial.boxes import Boxes
+from backend.spatial.boxes import Boxes, concatenated
 from backend.spatial.types import AnyArray, Array
 
 ARM = ("swing", "boom", "stick", "bucket")
@@ -94,6 +94,15 @@ class OwnImage:
         return self.own
 
 
+@dataclass(frozen=True)
+class _Around:
+    """One machine and what it can touch, in its root frame; together: the boxes of all layers."""
+
+    models: CellModels
+    layers: dict[str, Boxes]
+    together: Boxes
+
+
 def own_machines(snapshot: Snapshot, config: Config) -> list[str]:
     """Own machines whose surroundings are known now."""
     return [name for name in config.own if not why_unknown(name, snapshot.machines, snapshot.pairs)]
@@ -110,28 +119,22 @@ def own_image(
     the present one when None. Raises ValueError when `own` is not placed.
     """
     machine, state = config.machines[own], snapshot.machines[own]
-    around = surroundings_of(own, snapshot.machines, config)
-    q, layers = state.pose.joints, around.layers
+    q, layers = state.pose.joints, surroundings_of(own, snapshot.machines, config).layers
     eta = growth(own, snapshot.machines, config)
     slack = joint_slack(state.pose)
     models = cell_models(machine, q, eta, slack)
     edges = joint_edges(machine, q)
-    volume = _cells(models, layers, edges, q, dict.fromkeys((1, 2, 3), cells.volume))
+    around = _Around(models, layers, concatenated(layers.values()))
+    volume = _cells(around, edges, q, dict.fromkeys((1, 2, 3), cells.volume))
+    bars = joint_bars(machine, q, dict(enumerate(edges)), cells.bar, layers, models.eta, slack)
     return OwnImage(
         own=own,
         partners=tuple(name for name in snapshot.machines if name != own),
         state_time=snapshot.state_time,
         eta=models.eta,
         q=q,
-        slices=tuple(_slice(models, layers, edges, q, plane, cells.slice) for plane in PLANES),
-        bars=tuple(
-            Bar(
-                role,
-                edges[k],
-                joint_bar(machine, q, k, edges[k], cells.bar, layers, models.eta, slack),
-            )
-            for k, role in enumerate(ARM)
-        ),
+        slices=tuple(_slice(around, edges, q, plane, cells.slice) for plane in PLANES),
+        bars=tuple(Bar(role, edges[k], bars[k]) for k, role in enumerate(ARM)),
         volume=volume[0],
         volume_edges=edges[1:],
         reach=reach_image(machine, q, layers, cells.reach, tip_height),
@@ -156,15 +159,14 @@ def joint_edges(machine: Machine, q: Array) -> Array:
 
 
 def _slice(
-    models: CellModels,
-    layers: dict[str, Boxes],
+    around: _Around,
     edges: Array,
     q: Array,
     plane: tuple[int, int],
     n: int,
 ) -> Slice:
     i, j = plane
-    found = _plane(models, layers, edges, q, plane, (n, n))
+    found = _plane(around, edges, q, plane, (n, n))
     steps = np.diff(edges[[i, j]], axis=1).ravel() / n
     here = np.array(cell_of(edges[[i, j], 0], steps, (n, n), q[[i, j]]))
     first, last = np.maximum(here - PATCH, 0), np.minimum(here + PATCH + 1, n)
@@ -175,29 +177,26 @@ def _slice(
     part[[i, j], 0] = edges[[i, j], 0] + first * steps
     part[[i, j], 1] = edges[[i, j], 0] + last * steps
     size = (FINER * (last - first)).tolist()
-    patch = _plane(models, layers, part, q, plane, (size[0], size[1]))
+    patch = _plane(around, part, q, plane, (size[0], size[1]))
     return Slice(found.across, found.up, found.x, found.y, found.cells, patch)
 
 
 def _plane(
-    models: CellModels,
-    layers: dict[str, Boxes],
+    around: _Around,
     edges: Array,
     q: Array,
     plane: tuple[int, int],
     shape: tuple[int, int],
 ) -> Slice:
     i, j = plane
-    cells = _cells(models, layers, edges, q, {i: shape[0], j: shape[1]}).reshape(shape)
+    cells = _cells(around, edges, q, {i: shape[0], j: shape[1]}).reshape(shape)
     return Slice(ARM[i], ARM[j], edges[i], edges[j], cells)
 
 
-def _cells(
-    models: CellModels, layers: dict[str, Boxes], edges: Array, q: Array, spread: dict[int, int]
-) -> AnyArray:
+def _cells(around: _Around, edges: Array, q: Array, spread: dict[int, int]) -> AnyArray:
     """Cells over the joints of `spread` (joint: cells), the others held at q."""
     lower, upper, shape = q[:4].copy(), q[:4].copy(), [1, 1, 1, 1]
     for k, n in spread.items():
         lower[k], upper[k], shape[k] = edges[k, 0], edges[k, 1], n
     grid = JointGrid(lower, upper, (shape[0], shape[1], shape[2], shape[3]))
-    return coded(models, grid, layers)
+    return coded(around.models, grid, around.layers, around.together)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 from backend.fusion.pose import FusedPose
@@ -24,6 +25,19 @@ class ImageStamp:
 
 
 @dataclass(frozen=True)
+class Notice:
+    """What an operator should know about the cockpit itself. Never a safety level, and no alarm.
+
+    key: what it is about ("recording"); line: in words; since: first cycle with this key without
+    a break, set by the pipeline [s].
+    """
+
+    key: str
+    line: str
+    since: float = math.nan
+
+
+@dataclass(frozen=True)
 class Inputs:
     """Everything that arrived since the last cycle, in order of arrival."""
 
@@ -32,6 +46,7 @@ class Inputs:
     malformed: tuple[tuple[str, int], ...] = ()  # key, messages that the codec refused
     foreign: tuple[tuple[str, int], ...] = ()  # key prefix, messages of machines not of this site
     lost: int = 0  # messages dropped because the queue was full
+    notices: tuple[Notice, ...] = ()  # those that hold now
 
 
 @dataclass(frozen=True)
@@ -148,3 +163,4 @@ class Snapshot:
     alarms: tuple[Alarm, ...]
     health: Health
     margins: dict[str, MachineMargins] = field(default_factory=dict)  # by own machine
+    notices: tuple[Notice, ...] = ()

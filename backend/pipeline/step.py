@@ -22,7 +22,7 @@ from backend.pipeline.config import Config
 from backend.pipeline.margins import machine_margins
 from backend.pipeline.place import base_transform, place
 from backend.pipeline.proximity import measure
-from backend.pipeline.records import Body3D, Health, Inputs, MachineState, Snapshot
+from backend.pipeline.records import Body3D, Health, Inputs, MachineState, Notice, Snapshot
 from backend.safety import alarms, partner
 from backend.safety.alarms import Alarm
 from backend.safety.partner import Proximity
@@ -38,6 +38,7 @@ class State:
     common_time: float = -math.inf
     alarms: tuple[Alarm, ...] = ()
     health: Health = field(default_factory=lambda: Health({}, {}, 0, {}))
+    notices: tuple[Notice, ...] = ()
     cycle: int = 0
 
 
@@ -66,6 +67,7 @@ def step(state: State, inputs: Inputs, now: float, config: Config) -> tuple[Stat
     concerns = tuple(_partner(name, machines, close, unknown, now, config) for name in config.own)
     raised = alarms.update(state.alarms, concerns, now)
     health = _health(state.health, inputs, strangers)
+    notices = _notices(state.notices, inputs.notices, now)
     snapshot = Snapshot(
         time=now,
         state_time=common,
@@ -77,6 +79,7 @@ def step(state: State, inputs: Inputs, now: float, config: Config) -> tuple[Stat
         concerns=concerns,
         alarms=raised,
         health=health,
+        notices=notices,
     )
     following = replace(
         state,
@@ -84,6 +87,7 @@ def step(state: State, inputs: Inputs, now: float, config: Config) -> tuple[Stat
         common_time=common,
         alarms=raised,
         health=health,
+        notices=notices,
         cycle=state.cycle + 1,
     )
     return following, snapshot
@@ -129,6 +133,16 @@ def _partner(
         return partner.unknown(name, joints, unknown[name], now)
     braking = approach_of(name, machines, now, config) if config.drive else None
     return partner.judge(name, joints, tuple(close[name]), config.limits, now, braking)
+
+
+def _notices(
+    before: tuple[Notice, ...], present: tuple[Notice, ...], now: float
+) -> tuple[Notice, ...]:
+    """Those that hold now, each with the time since when its key has been told."""
+    if not present:
+        return ()
+    since = {notice.key: notice.since for notice in before}
+    return tuple(replace(notice, since=since.get(notice.key, now)) for notice in present)
 
 
 def _health(before: Health, inputs: Inputs, strangers: int) -> Health:

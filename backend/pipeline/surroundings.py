@@ -71,19 +71,24 @@ def surroundings(
 
     body: where `machine` is; others: all other machines by name.
     """
-    boxes = [site.boxes]
-    names = [f"site:{name}" for name in site.names]
-    partner = [False] * len(site.boxes)
+    apart = np.linalg.norm(site.boxes.centers - body.swing_center, axis=1)
+    # Few boxes of a large site are near: only those are looked at, and named.
+    near = np.flatnonzero(apart <= machine.bounding_radius + site.radii)
+    around = site.boxes.take(near)
+    kept = within(around, body, machine.bounding_radius)
+    boxes = [around.take(kept)]
+    names = [site.full_names[k] for k in near[kept]]
+    of_site = len(names)
     for name, (other, placed) in others.items():
-        boxes.append(placed.boxes)
-        names += [f"{name}:{part}" for part in other.body_names]
-        partner += [True] * len(placed.boxes)
-    everything = concatenated(boxes)
-    near = within(everything, body, machine.bounding_radius)
+        kept = within(placed.boxes, body, machine.bounding_radius)
+        boxes.append(placed.boxes.take(kept))
+        names += [
+            f"{name}:{part}" for part, near_ in zip(other.body_names, kept, strict=True) if near_
+        ]
     return Surroundings(
-        everything.take(near).moved(transform.inverse(body.link_poses[0])),
-        tuple(name for name, kept in zip(names, near, strict=True) if kept),
-        np.array(partner, dtype=bool)[near],
+        concatenated(boxes).moved(transform.inverse(body.link_poses[0])),
+        tuple(names),
+        np.arange(len(names)) >= of_site,
     )
 
 

@@ -3,10 +3,26 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable
 from typing import Any
 
 from backend.pipeline.records import Snapshot
+
+
+class OncePerSnapshot:
+    """What is made of a snapshot, made once for all who ask for the same one. Nobody changes it."""
+
+    def __init__(self, make: Callable[[Snapshot], dict[str, Any]]) -> None:
+        self._make = make
+        self._lock = threading.Lock()
+        self._made: tuple[Snapshot | None, dict[str, Any]] = (None, {})
+
+    def __call__(self, snapshot: Snapshot) -> dict[str, Any]:
+        with self._lock:
+            if self._made[0] is not snapshot:
+                self._made = (snapshot, self._make(snapshot))
+            return self._made[1]
 
 
 class Hub:
@@ -17,10 +33,12 @@ class Hub:
         self._snapshot: Snapshot | None = None
         self._images: dict[tuple[str, str], Any] = {}
         self._listeners: list[Callable[[], None]] = []
+        self._published = 0.0
 
     def publish(self, snapshot: Snapshot) -> None:
         with self._changed:
             self._snapshot = snapshot
+            self._published = time.monotonic()
             self._changed.notify_all()
             listeners = tuple(self._listeners)
         for notify in listeners:
@@ -33,6 +51,10 @@ class Hub:
 
     def latest(self) -> Snapshot | None:
         return self._snapshot
+
+    def age(self) -> float | None:
+        """Seconds since the newest snapshot was published; None before the first."""
+        return None if self._snapshot is None else time.monotonic() - self._published
 
     def wait(self, after_cycle: int, timeout: float) -> Snapshot | None:
         """The newest snapshot past `after_cycle`, or None after `timeout` seconds."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from backend.site.tables import ObstacleMesh
 from backend.spatial.boxes import NO_BOXES, Boxes, concatenated
 from backend.spatial.rotation import rz
 from backend.spatial.transform import make
+from backend.spatial.types import Array
 
 
 @dataclass(frozen=True)
@@ -27,6 +29,16 @@ class SiteBodies:
     def __post_init__(self) -> None:
         if len(self.names) != len(self.boxes):
             raise ValueError(f"{len(self.boxes)} boxes have {len(self.names)} names")
+
+    @cached_property
+    def radii(self) -> Array:
+        """(n,) of the spheres around the boxes [m]."""
+        return np.asarray(np.linalg.norm(self.boxes.half_extents, axis=1))
+
+    @cached_property
+    def full_names(self) -> tuple[str, ...]:
+        """ "site:wall", "site:hall/0"."""
+        return tuple(f"site:{name}" for name in self.names)
 
 
 NO_SITE_BODIES = SiteBodies()

@@ -19,6 +19,7 @@ from backend.site.tables import (
     Obstacle,
     ObstacleMesh,
     Rates,
+    Recording,
     Safety,
     SiteMachine,
     SiteTable,
@@ -31,7 +32,8 @@ SITES = Path(__file__).resolve().parents[2] / "scenes" / "sites"
 
 @dataclass(frozen=True)
 class Site:
-    """A site as every room reads it. path: the file; relative paths in it are against `folder`."""
+    """A site as every room reads it. path: the file; relative paths in it are against `folder`;
+    can_map: the map of its CAN logs."""
 
     path: Path
     name: str
@@ -45,6 +47,8 @@ class Site:
     obstacles: tuple[Obstacle, ...]
     meshes: tuple[ObstacleMesh, ...]
     link: Link
+    recording: Recording
+    can_map: Path | None = None
 
     @property
     def folder(self) -> Path:
@@ -105,6 +109,7 @@ def parse_site(data: dict[str, Any], path: Path) -> Site:
         )
     except InputError as error:
         raise InputError(f"{path}: frame.{error}") from error
+    can_map = table.can.map
     return Site(
         path=path.resolve(),
         name=table.name,
@@ -118,6 +123,8 @@ def parse_site(data: dict[str, Any], path: Path) -> Site:
         obstacles=table.obstacle,
         meshes=table.obstacle_mesh,
         link=table.link,
+        recording=table.recording,
+        can_map=path.resolve().parent / can_map if can_map else None,
     )
 
 

@@ -4,32 +4,27 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import ConfigDict, Field, field_validator, model_validator
 
 from backend.machine.model import ROLES
+from backend.site.base import (
+    Degrees,
+    MachineName,
+    Matrix,
+    Name,
+    NotNegative,
+    Positive,
+    Prefix,
+    Table,
+    Tilt,
+    Vector,
+)
+from backend.site.others import Can, MachineTopics, refuse_shared_topics
 from backend.spatial.rotation import rz
 from backend.spatial.types import Array, frozen
-
-Vector: TypeAlias = tuple[float, float, float]
-Matrix: TypeAlias = tuple[Vector, Vector, Vector]
-Degrees: TypeAlias = Annotated[float, Field(ge=-360.0, le=360.0)]
-Tilt: TypeAlias = Annotated[float, Field(ge=-45.0, le=45.0)]
-Positive: TypeAlias = Annotated[float, Field(gt=0.0)]
-NotNegative: TypeAlias = Annotated[float, Field(ge=0.0)]
-Name: TypeAlias = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+$", max_length=64)]
-MachineName: TypeAlias = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$", max_length=32)]
-Prefix: TypeAlias = Annotated[
-    str, Field(pattern=r"^[A-Za-z0-9_-]+(/[A-Za-z0-9_-]+)*$", max_length=128)
-]
-
-
-class Table(BaseModel):
-    """One table: unknown fields, wrong types, NaN and infinities are refused."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
 
 class Frame(Table):
@@ -125,6 +120,7 @@ class SiteMachine(Table):
     sidecar: Annotated[str, Field(min_length=1)] | None = None
     prefix: Prefix = ""
     start: Start | None = None
+    topics: MachineTopics = MachineTopics()
     sim: MachineSim = MachineSim()
 
     @model_validator(mode="before")
@@ -198,6 +194,18 @@ class Link(Table):
     listen: tuple[str, ...] = ()
 
 
+class Recording(Table):
+    """What a running cockpit records. folder: of all recordings, relative to the site file; empty
+    for $EXCAVATOR_COCKPIT_RECORDINGS or ~/.local/state/excavator-cockpit/recordings. The oldest
+    parts beyond max_gib [GiB] and max_hours [h] are deleted, except those that are pinned.
+    """
+
+    enabled: bool = True
+    folder: str = ""
+    max_gib: Annotated[float, Field(ge=0.1, le=10_000.0)] = 4.0
+    max_hours: Annotated[float, Field(ge=0.1, le=10_000.0)] = 24.0
+
+
 class SiteTable(Table):
     """A whole site file."""
 
@@ -212,12 +220,15 @@ class SiteTable(Table):
     obstacle: tuple[Obstacle, ...] = ()
     obstacle_mesh: tuple[ObstacleMesh, ...] = ()
     link: Link = Link()
+    recording: Recording = Recording()
+    can: Can = Can()
 
     @model_validator(mode="after")
     def _distinct(self) -> SiteTable:
         _refuse_duplicates("machine", "name", [machine.name for machine in self.machine])
         obstacles = [o.name for o in self.obstacle] + [m.name for m in self.obstacle_mesh]
         _refuse_duplicates("obstacle", "name", obstacles)
+        refuse_shared_topics((machine.name, machine.topics) for machine in self.machine)
         prefixes = sorted(machine.prefix + "/" for machine in self.machine)
         for shorter, longer in pairwise(prefixes):
             if longer.startswith(shorter):

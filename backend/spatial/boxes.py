@@ -43,7 +43,7 @@ class Boxes:
 
     def take(self, index: IntArray | BoolArray) -> Boxes:
         """The boxes at `index`: indices or a mask along the first axis."""
-        return Boxes(self.centers[index], self.rotations[index], self.half_extents[index])
+        return _known(self.centers[index], self.rotations[index], self.half_extents[index])
 
     def inflated(self, margin: float) -> Boxes:
         """Each box grown by `margin` [m] on every side (contains the Minkowski sum with a ball)."""
@@ -55,13 +55,26 @@ class Boxes:
         return Boxes(self.centers @ R.T + T[:3, 3], R @ self.rotations, self.half_extents)
 
 
+def _known(centers: Array, rotations: Array, half_extents: Array) -> Boxes:
+    """Boxes of arrays that come from other boxes and belong to nobody else: not checked again."""
+    boxes = object.__new__(Boxes)
+    for name, values in (
+        ("centers", centers),
+        ("rotations", rotations),
+        ("half_extents", half_extents),
+    ):
+        values.setflags(write=False)
+        object.__setattr__(boxes, name, values)
+    return boxes
+
+
 NO_BOXES = Boxes(np.zeros((0, 3)), np.zeros((0, 3, 3)), np.zeros((0, 3)))
 
 
 def concatenated(parts: Iterable[Boxes]) -> Boxes:
     """All boxes of one frame, in order; none when there are no parts."""
     all_parts = [NO_BOXES, *parts]
-    return Boxes(
+    return _known(
         np.concatenate([p.centers for p in all_parts]),
         np.concatenate([p.rotations for p in all_parts]),
         np.concatenate([p.half_extents for p in all_parts]),

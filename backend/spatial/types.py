@@ -19,9 +19,10 @@ def frozen(values: object, shape: tuple[int | None, ...], name: str) -> Array:
     shape: one entry per axis, None where any length is allowed.
     """
     array = np.array(values, dtype=np.float64)
-    fits = array.ndim == len(shape) and all(
-        want is None or want == have for want, have in zip(shape, array.shape, strict=True)
-    )
+    fits = array.ndim == len(shape)
+    if fits and array.shape != shape:
+        for wanted, length in zip(shape, array.shape, strict=True):
+            fits = fits and (wanted is None or wanted == length)
     if not fits:
         want = "x".join("n" if n is None else str(n) for n in shape)
         have = "x".join(map(str, array.shape)) or "a single number"

@@ -2,8 +2,9 @@
 
 import { $, make, mark, partName, slowText, steady, write } from "./words.js";
 import { metres, seconds } from "./axis.js";
-import { alarms, atLeast, label, link, machine, pair, severity, silence, snapshotAge, state } from "./state.js";
+import { alarms, atLeast, label, link, machine, notices, pair, replaying, severity, silence, snapshotAge, state, wall } from "./state.js";
 import { levelShape } from "./glyphs.js";
+import { wallClock } from "./clock.js";
 import { acknowledge, acknowledged, sound } from "./sound.js";
 import { ageLevel, ageText } from "./head.js";
 
@@ -13,13 +14,23 @@ let listOpen = false;
 let listKey = "";
 const calmDistance = steady(0.06);
 
-/** The line's level, words and key; the key changes when the digits must not wait. */
+/** A notice speaks where all is calm, above the distance; it never takes the place of an alarm. */
 function compose() {
+  const now = judge();
+  const [first, ...more] = notices();
+  if (!first) return now;
+  if (now.level !== "CLEAR") return { ...now, more: (now.more ?? 0) + 1 + more.length };
+  return { level: "NOTICE", line: first.line, detail: now.line, key: `${first.key} ${first.line.replace(/[\d.]+/g, "")}`, more: more.length };
+}
+
+/** The line's level, words and key; the key changes when the digits must not wait. */
+function judge() {
   const s = state.snapshot;
   const state_ = link();
   if (!s) return { level: "NONE", line: state_ === "connecting" ? "Connecting to the backend" : "Waiting for data", detail: "", key: "none" };
   if (state_ === "lost") {
-    return { level: "UNKNOWN", line: `LINK LOST · last data ${seconds(silence())} ago`, detail: "Nothing on this page is current. Clearance unknown. Reconnecting.", key: "lost" };
+    const detail = replaying() ? "The player does not answer, or is still at work on what was asked. Nothing here moves on." : "Nothing on this page is current. Clearance unknown. Reconnecting.";
+    return { level: "UNKNOWN", line: `LINK LOST · last data ${seconds(silence())} ago`, detail, key: "lost" };
   }
   const [first, ...more] = alarms();
   if (first) {
@@ -53,7 +64,7 @@ export function silenceAlarms() {
 }
 
 export function showList(open) {
-  listOpen = open && alarms().length > 0;
+  listOpen = open && alarms().length + notices().length > 0;
   $("alarm-list").hidden = !listOpen;
   $("alarm-more").setAttribute("aria-expanded", String(listOpen));
   listKey = "";
@@ -75,15 +86,15 @@ export function update() {
   }
   const present = alarms();
   const unseen = present.some((alarm) => !acknowledged(alarm));
-  mark(box, "unseen", unseen && now.level !== "CLEAR" ? 1 : 0);
+  mark(box, "unseen", unseen && severity[now.level] > 0 ? 1 : 0);
   $("alarm-ack").hidden = !unseen || link() === "lost";
   const more = $("alarm-more");
   more.hidden = !(now.more > 0);
   write(more, `+${now.more ?? 0}`);
-  more.title = "All alarms";
+  more.title = "All alarms and notices";
   const p = pair(state.own, state.partner);
   sound(present, (p?.approach ?? 0) > 0);
-  if (listOpen && !present.length) showList(false);
+  if (listOpen && !present.length && !notices().length) showList(false);
   else list();
 }
 
@@ -91,14 +102,16 @@ function list() {
   if (!listOpen) return;
   const s = state.snapshot;
   const present = alarms();
-  const key = present.map((a) => a.line).join("|");
+  const told = notices();
+  const key = [...present, ...told].map((a) => a.line).join("|");
   if (key === listKey) return;
   listKey = key;
   const items = present.map((a) => {
-    const since = new Date((s.wall - (s.time - a.since)) * 1000).toLocaleTimeString([], { hour12: false });
+    const since = wallClock(wall() - (s.time - a.since));
     return make("li", {}, make("b", { "data-level": a.level, text: a.level }), make("span", { text: a.line.replace(/^[A-Z]+ · /, "") }), make("span", { class: "dim", text: `since ${since}` }), make("small", { text: a.detail ?? "" }));
   });
-  $("alarm-list").replaceChildren(make("ul", {}, ...items));
+  const said = told.map((n) => make("li", {}, make("b", { "data-level": "NOTICE", text: "NOTICE" }), make("span", { text: n.line }), make("span", { class: "dim", text: Number.isFinite(n.since) ? `since ${wallClock(wall() - (s.time - n.since))}` : "" })));
+  $("alarm-list").replaceChildren(make("ul", {}, ...items, ...said));
 }
 
 export const worst = (name) => alarms().filter((a) => a.machine === name).reduce((level, a) => (severity[a.level] > severity[level] ? a.level : level), "CLEAR");

@@ -79,6 +79,9 @@ export function levelShape(level) {
   if (level === "UNKNOWN") {
     return [svg("circle", { cx: 24, cy: 24, r: 21, fill: "none", stroke: C.unknown, "stroke-width": 4, "stroke-dasharray": "8 5" }), question("#FFC9C3")];
   }
+  if (level === "NOTICE") {
+    return [svg("circle", { cx: 24, cy: 24, r: 20, fill: "none", stroke: C.text, "stroke-width": 3 }), svg("path", { d: "M22 21h4v14h-4zM22 12h4v5h-4z", fill: C.text })];
+  }
   return [];
 }
 

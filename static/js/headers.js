@@ -19,10 +19,10 @@ export function startHeaders(switchImages) {
 }
 
 /** The fullest wording that the place in the header has room for. */
-function widest(place, texts) {
+export function widest(place, texts, given = null) {
   const panel = place.closest(".panel");
   const others = [...panel.querySelectorAll("header > *")].filter((node) => node !== place).reduce((sum, node) => sum + node.getBoundingClientRect().width + 8, 0);
-  const room = panel.clientWidth - others - 80; // the age can grow by a glyph and digits meanwhile
+  const room = given ?? panel.clientWidth - others - 80; // the age can grow by a glyph and digits meanwhile
   const g = (widest.g ??= document.createElement("canvas").getContext("2d"));
   const style = getComputedStyle(place);
   g.font = `${style.fontWeight} ${style.fontSize} ${style.fontFamily}`;

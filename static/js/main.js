@@ -3,7 +3,7 @@
 import { connect } from "./socket.js";
 import { readSizes } from "./theme.js";
 import { $ } from "./words.js";
-import { accept, choose, exactImage, far, image, imageAge, imageStale, label, link, names, silence, snapshotAge, state } from "./state.js";
+import { accept, choose, exactImage, far, image, imageAge, imageStale, label, link, names, replaying, silence, snapshotAge, state } from "./state.js";
 import { head } from "./head.js";
 import * as hover from "./hover.js";
 import * as alarm from "./alarm.js";
@@ -22,6 +22,14 @@ import { bars } from "./plots/bars.js";
 import { limits } from "./plots/limits.js";
 import { trends } from "./plots/trends.js";
 import { timeline } from "./plots/timeline.js";
+import * as player from "./player.js";
+import * as session from "./session.js";
+import * as sheets from "./sheets.js";
+import * as transport from "./transport.js";
+import * as recording from "./recording.js";
+import * as watermark from "./watermark.js";
+import { startSeries } from "./series_pointer.js";
+import { sessionKey } from "./keys.js";
 
 readSizes();
 
@@ -75,7 +83,10 @@ function onKey(event) {
   else if (event.key === "m" || event.key === "M") toggleSound();
   else if (event.key === "x" || event.key === "X") switchImages();
   else if (event.key === "t" || event.key === "T") plots.plan.turning();
+  else if (sessionKey(event)) event.stopPropagation(); // the scene's own keys would turn its camera
   else if (event.key === "Escape") {
+    sheets.close();
+    recording.closeRecording();
     hover.hide();
     ghost.unpin();
     alarm.showList(false);
@@ -106,13 +117,18 @@ addEventListener("resize", () => {
 const scheme = location.protocol === "https:" ? "wss:" : "ws:";
 const socket = connect(`${scheme}//${location.host}/ws`, onFrame, (word) => {
   state.socket = word;
+  if (word === "open") session.reconnected();
 });
 tip.startTip(socket.send);
 ghost.startGhost(socket.send, redraw);
 headers.startHeaders(switchImages);
+player.startPlayer(socket.send);
+transport.startTransport();
+recording.startRecording();
+startSeries(plots.trends);
 
 function onFrame(header, arrays) {
-  const partner = state.partner;
+  const { partner, snapshot: before } = state;
   accept(header, arrays);
   if (header.type === "site") {
     updateCameras(socket.send);
@@ -123,14 +139,20 @@ function onFrame(header, arrays) {
     push(latency.arrival, Date.now() - 1000 * header.wall);
     waitingToDraw = header.wall;
     for (const s of live) s.dirty = true;
-    if (partner !== state.partner) for (const s of images) s.dirty = true;
+    // After a jump an image can be right again that was of another time.
+    if (partner !== state.partner || (replaying() && before?.time !== header.time)) for (const s of images) s.dirty = true;
   } else if (header.type === "exact" ? header.own === state.own : header.key === `${state.own}<-${state.partner}`) {
-    for (const s of images) s.dirty = true;
+    for (const s of replaying() ? [...images, plots.bars, plots.plan] : images) s.dirty = true;
   }
 }
 
 /** Words, ages and levels: ten times a second whether or not anything arrives. */
 function tick() {
+  watermark.update();
+  session.refresh();
+  transport.update();
+  sheets.update();
+  recording.update();
   alarm.update();
   topbar.update();
   demo.update();
@@ -160,7 +182,7 @@ function frame(now) {
   let drawn = false;
   for (const [s, period] of PERIOD) {
     // A picture that only grows old needs no more than two drawings a second.
-    const slow = s !== plots.plan && silence() > 1 ? 500 : period;
+    const slow = s !== plots.plan && silence() > 1 ? 500 : s === plots.timeline && replaying() ? 45 : period;
     if (s.draw(now, slow) && s === plots.plan) drawn = true;
   }
   if (drawn && waitingToDraw !== null) {
@@ -179,6 +201,7 @@ window.cockpit = Object.freeze({
   get state() { return state; },
   get latency() { return { arrival: quantiles(latency.arrival), drawn: quantiles(latency.drawn) }; },
   get link() { return link(); },
+  get ages() { return { snapshot: snapshotAge() }; },
   get rejected() { return socket.rejected(); },
   get paint() { return Object.fromEntries([...PERIOD.keys()].map((s) => [s.canvas.id, Math.round(s.cost * 100) / 100])); },
 });

@@ -1,6 +1,6 @@
 // Drawing steps that several plots share.
 
-import { C, font, size } from "./theme.js";
+import { C, font, rgba, size } from "./theme.js";
 
 export function clear(g, width, height, colour = C.panel) {
   g.fillStyle = colour;
@@ -82,3 +82,19 @@ export const swatches = {
   },
   glyph: (draw) => (g, x, y, w) => draw(g, x + w / 2, y),
 };
+
+/** PLAYBACK across a picture, outlined so that what is below can be read. */
+export function playbackMark(g, box) {
+  g.save();
+  g.translate((box.left + box.right) / 2, (box.top + box.bottom) / 2);
+  g.rotate(-Math.PI / 10);
+  g.font = font("t3", 800);
+  const k = (0.86 * (box.right - box.left)) / g.measureText("PLAYBACK").width;
+  g.scale(k, k);
+  g.textAlign = "center";
+  g.textBaseline = "middle";
+  g.lineWidth = 1.6 / k;
+  g.strokeStyle = rgba(C.playbackLine, 0.4);
+  g.strokeText("PLAYBACK", 0, 0);
+  g.restore();
+}

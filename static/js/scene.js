@@ -12,7 +12,7 @@ export function startScene(onKey) {
   const frame = $("scene");
   frame.addEventListener("load", () => {
     try {
-      frame.contentWindow.addEventListener("keydown", onKey);
+      frame.contentWindow.addEventListener("keydown", onKey, true);
     } catch {
       // another origin: the keys then work outside the scene only
     }

@@ -1,6 +1,7 @@
 // Alarm sounds: STOP three pulses every 2 s, UNKNOWN a falling pair, SLOW one tone. Off until a click allows it.
 
 import { $, mark, write } from "./words.js";
+import { replaying, state } from "./state.js";
 
 let context = null;
 let on = false;
@@ -31,7 +32,7 @@ const PATTERNS = {
 
 function show() {
   write($("sound-word"), on ? "SOUND ON" : "SOUND OFF");
-  write($("sound-hint"), on ? "M: mute" : context ? "M: unmute" : "click to allow");
+  write($("sound-hint"), on ? "M: mute" : lastMode === "PLAYBACK" ? "in playback" : context ? "M: unmute" : "click to allow");
   $("sound").setAttribute("aria-pressed", String(on));
   mark(document.body, "sound", on ? "on" : "off");
 }
@@ -40,6 +41,16 @@ export function toggleSound() {
   context ??= new AudioContext();
   context.resume();
   on = !on;
+  show();
+}
+
+let lastMode = "";
+
+/** A recorded alarm is nobody's alarm: in playback the sound starts off, and says so. */
+export function soundFor(mode) {
+  if (mode === lastMode) return;
+  if (mode === "PLAYBACK") on = false;
+  lastMode = mode;
   show();
 }
 
@@ -66,7 +77,7 @@ export function sound(alarms, approaching) {
   if (loud.level === "SLOW" && !approaching) return;
   lastKey = key;
   lastTime = now;
-  if (on && context?.state === "running") PATTERNS[loud.level]?.();
+  if (on && !(replaying() && !state.snapshot.playback?.playing) && context?.state === "running") PATTERNS[loud.level]?.();
 }
 
 export function startSound() {

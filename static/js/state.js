@@ -1,8 +1,8 @@
 // What the page knows. Frames go in through `accept`; everything that draws only reads.
 
 import { wrap } from "./axis.js";
+import { forgetHistory, remember } from "./memory.js";
 
-const HISTORY = 60; // seconds of trends
 const ZONE_OLD = 2.5; // exact zones are made once a second [s]
 const SWITCH = 0.3; // a new partner must be this much nearer [m], so that the panels do not flip
 
@@ -26,8 +26,14 @@ export const state = {
 
 const KINDS = { sun: "images", exact: "exact", zone: "zones" };
 let minimumDelay = Infinity;
-let lastHistory = -Infinity;
-let touching = false;
+
+export const mode = () => state.snapshot?.mode ?? state.site?.mode ?? "";
+
+/** A recorded session is shown, not the machines. */
+export const replaying = () => mode() === "PLAYBACK";
+
+/** Clock on the wall of what the snapshot shows [s since 1970]. */
+export const wall = () => state.snapshot?.playback?.wall ?? state.snapshot?.wall;
 
 export function accept(header, arrays) {
   const now = performance.now();
@@ -38,6 +44,7 @@ export function accept(header, arrays) {
     if (state.snapshot && names().some((name) => !(name in state.snapshot.machines))) forget();
   } else if (header.type === "snapshot") {
     if (state.snapshot && header.cycle < state.snapshot.cycle && header.time < state.snapshot.time) forget(); // restarted
+    else if (state.snapshot && header.mode === "PLAYBACK" && header.time < state.snapshot.time) forgetHistory(); // images stay: their age tells
     Object.values(header.machines).forEach(normalise);
     state.snapshot = header;
     state.arrival = now;
@@ -67,9 +74,7 @@ function normalise(machine) {
 
 function forget() {
   for (const kept of Object.values(KINDS)) state[kept].clear();
-  state.history.length = 0;
-  state.events.length = 0;
-  lastHistory = -Infinity;
+  forgetHistory();
 }
 
 export const names = () => Object.keys(state.site?.machines ?? state.snapshot?.machines ?? {});
@@ -131,18 +136,23 @@ export const noImage = () => (far() === null ? "no image yet" : `${label(state.p
 /** Seconds since the last snapshot arrived. */
 export const silence = () => (performance.now() - state.arrival) / 1000;
 
+/** What waiting adds to ages. Recorded data grow no older while the player answers, paused or not. */
+const waited = () => (replaying() && silence() <= 1 ? 0 : silence());
+
 /** Age of what the snapshot says: pipeline, the way here beyond the quickest seen, and waiting since. */
 export function snapshotAge() {
   const s = state.snapshot;
   if (!s) return Infinity;
-  const delay = state.delays.length ? Math.max(0, state.delays[state.delays.length - 1] - minimumDelay) : 0;
-  return Math.max(0, s.time - (s.state_time ?? s.time)) + delay + silence();
+  const delay = state.delays.length && !replaying() ? Math.max(0, state.delays[state.delays.length - 1] - minimumDelay) : 0;
+  return Math.max(0, s.time - (s.state_time ?? s.time)) + delay + waited();
 }
 
 /** Age of an image's state, by the server's clock as the newest snapshot carries it. */
 export function imageAge(entry) {
   if (!entry || !state.snapshot) return Infinity;
-  const own = Math.max(0, state.snapshot.time - entry.header.state_time) + silence();
+  const since = state.snapshot.time - entry.header.state_time;
+  // After a jump back a picture can be of what is yet to come: as wrong as one of long ago.
+  const own = (replaying() ? Math.abs(since) : Math.max(0, since)) + waited();
   // A picture is no younger than the pose of a machine that has gone silent.
   const invalid = parties(entry).filter((name) => machine(name).validity !== "VALID");
   return Math.max(own, ...invalid.map(dataAge));
@@ -165,7 +175,7 @@ export function dataAge(name) {
   const ages = machine(name)?.ages;
   if (!ages) return Infinity;
   const known = Object.values(ages).map((a) => (a === null ? Infinity : a));
-  return Math.max(...known) + silence();
+  return Math.max(...known) + waited();
 }
 
 /** Angles of Sun 2020, Fig. 2, from a joint's own value: sign * q + offset. */
@@ -201,34 +211,11 @@ export function alarms() {
   return active.map((a, i) => [a, i]).sort(([a, i], [b, j]) => severity[b.level] - severity[a.level] || mine(a) - mine(b) || i - j).map(([a]) => a);
 }
 
+/** What the operator should know though no machine is in danger: [{key, line, since}]. */
+export const notices = () => state.snapshot?.notices ?? [];
+
 export const partnerLevel = (distance) => {
   const safety = state.site?.safety ?? { slow_below: 0.8, stop_below: 0.2 };
   if (distance === null || distance === undefined) return "UNKNOWN";
   return distance < safety.stop_below ? "STOP" : distance < safety.slow_below ? "SLOW" : "CLEAR";
 };
-
-function remember() {
-  const s = state.snapshot;
-  const p = pair(state.own, state.partner);
-  const distance = atLeast(p);
-  for (const { distance: d } of s.pairs) if (d !== null && d < state.closest) state.closest = d;
-  const contact = s.pairs.some((q) => q.distance !== null && q.distance <= 0);
-  if (contact && !touching) state.contacts += 1;
-  touching = contact;
-
-  if (s.time - lastHistory >= 0.2 || s.time < lastHistory) {
-    lastHistory = s.time;
-    const ages = Object.fromEntries(names().map((name) => [name, machine(name)?.ages?.joints ?? null]));
-    state.history.push({ time: s.time, distance, pair: `${state.own} ${state.partner}`, ages });
-    while (state.history.length && state.history[0].time < s.time - HISTORY) state.history.shift();
-  }
-
-  const open = new Map(state.events.filter((e) => e.end === null).map((e) => [e.key, e]));
-  for (const alarm of alarms()) {
-    const key = `${alarm.name} ${alarm.machine} ${alarm.level}`;
-    if (open.delete(key)) continue;
-    state.events.push({ key, level: alarm.level, label: alarm.line, machine: alarm.machine, start: s.time, end: null });
-  }
-  for (const event of open.values()) event.end = s.time;
-  state.events = state.events.filter((e) => e.end === null || e.end > s.time - HISTORY);
-}

@@ -2,8 +2,9 @@
 
 import { $, make, mark, slowText, write } from "./words.js";
 import { number, seconds } from "./axis.js";
-import { dataAge, label, link, machine, names, silence, state } from "./state.js";
+import { dataAge, label, link, machine, mode as modeOf, names, replaying, silence, state } from "./state.js";
 import { lampShape } from "./glyphs.js";
+import { soundFor } from "./sound.js";
 import { worst } from "./alarm.js";
 
 const FIX = { RTK_FIXED: "RTK fixed", RTK_FLOAT: "RTK float", FIXED: "RTK fixed", FLOAT: "RTK float", DGNSS: "DGNSS", SINGLE: "single fix", NONE: "no fix" };
@@ -60,16 +61,20 @@ export function update() {
   if (state.site) {
     write($("site-title"), state.site.title ?? state.site.name);
     const epsg = state.site.frame?.epsg ? `EPSG:${state.site.frame.epsg}` : "";
-    write($("site-name"), [state.site.name, epsg].filter(Boolean).join(" · "));
+    write($("site-name"), state.snapshot?.playback?.title || [state.site.name, epsg].filter(Boolean).join(" · "));
   }
   if (!s) return;
-  const mode = s.mode ?? state.site?.mode;
+  const mode = modeOf();
   write($("mode"), mode);
+  write($("stop-word"), replaying() ? "Recorded: no machine" : "Monitoring only, no control");
+  $("stop-place").title = replaying() ? "A recorded session. Nothing on this page reaches a machine. This operator aid is not a safety-rated stop." : "Monitoring only: no machine control from this page yet. This operator aid is not a safety-rated stop.";
   mark($("mode"), "mode", mode);
   const ms = s.backend?.cycle_ms ?? s.backend?.step;
   const hz = s.backend?.rate_hz ?? s.backend?.step?.rate;
   cycle(Number.isFinite(ms?.p95) ? `cycle ${number(ms.p95, ms.p95 < 100 ? 1 : 0)} ms` : "cycle –");
   rate(Number.isFinite(hz) ? `p95 · ${number(hz, 0)} Hz` : "");
+  $("link").title = $("backend").checkVisibility() ? "" : `${$("cycle").textContent} ${$("rate").textContent}`;
+  soundFor(mode);
   build();
   for (const [name, parts] of machines) {
     const m = machine(name);

@@ -13,7 +13,7 @@ from backend.errors import InputError
 from backend.fusion.samples import ClockSample, JointSample
 from backend.shell.link.encode import encode_clock, encode_joint_states, encode_status
 from backend.shell.link.messages import AgentStatus
-from backend.shell.link.receiver import QUEUE, Receiver
+from backend.shell.link.receiver import BESIDE_BYTES, QUEUE, Receiver
 from backend.shell.link.session import open_session, publisher, with_port
 from backend.shell.link.topics import key
 
@@ -112,7 +112,7 @@ def test_full_queue_drops_the_oldest_and_says_so(wire):
     cockpit, _, _ = wire
     receiver = Receiver(cockpit, {"left": "left"})
     for i in range(QUEUE + 10):
-        receiver._enqueue("left", "joint_states", _Bytes(joints(float(i))), float(i))
+        receiver._enqueue("left", "left/joint_states", 5, _Bytes(joints(float(i))), float(i))
     drained = receiver.drain()
     assert drained.lost == 10
     assert drained.samples[0].stamp == 10.0
@@ -129,7 +129,7 @@ def test_labels_do_not_grow_without_end(wire):
     cockpit, _, _ = wire
     receiver = Receiver(cockpit, {"left": "left"})
     for i in range(1000):
-        receiver._enqueue("left", f"unknown/{i}", _Bytes(b""), 0.0)
+        receiver._enqueue("left", f"left/unknown/{i}", 5, _Bytes(b""), 0.0)
     labels = dict(receiver.drain().malformed)
     assert len(labels) <= 101
     assert sum(labels.values()) == 1000
@@ -239,3 +239,66 @@ def test_bad_prefix(wire):
     for bad in ("", "left/", "l*ft", "a b"):
         with pytest.raises(InputError, match="not a key prefix"):
             Receiver(wire[0], {bad: "left"})
+
+
+def test_all_that_is_to_be_recorded_is_handed_on_as_it_came(wire):
+    cockpit, machine, _ = wire
+    row = key("clock", "plant/one")
+    answering = machine.declare_queryable(row, lambda q: q.reply(row, encode_clock(5.0)))
+    receiver = Receiver(cockpit, {"plant/one": "left"}, poll_period=0.05, everything=True)
+    out = publisher(machine, "joint_states", "plant/one")
+    wait_until(lambda: out.matching_status.matching)
+    sent = {
+        "joint_states": joints(1.0),
+        "cmd": b"a command, not decoded here",
+        "points": b"many points",
+        "gnss/fix": b"broken, and evidence all the same",
+        "truth": b"only for tests",
+    }
+    for suffix, payload in sent.items():
+        machine.put(f"plant/one/{suffix}", payload)
+    heard, malformed, samples = [], {}, []
+
+    def all_there():
+        drained = receiver.drain()
+        heard.extend(drained.heard)
+        samples.extend(drained.samples)
+        malformed.update(dict(drained.malformed))
+        clocks = [h for h in heard if isinstance(h, ClockSample)]
+        return len(clocks) >= 2 and len(heard) - len(clocks) >= 4
+
+    wait_until(all_there)
+    raw = [h for h in heard if not isinstance(h, ClockSample)]
+    del sent["truth"]
+    assert {h.suffix: h.payload for h in raw} == sent
+    assert {h.key for h in raw} == {f"plant/one/{suffix}" for suffix in sent}
+    assert {h.machine for h in raw} == {"left"}
+    assert malformed == {"left/gnss/fix": 1, "left/truth": 1}
+    # What the fusion got stands in the same order in the recording.
+    arrivals = [s.received if isinstance(s, ClockSample) else s.arrival for s in samples]
+    of_fusion = [h for h in heard if isinstance(h, ClockSample) or h.suffix == "joint_states"]
+    told = [h.received if isinstance(h, ClockSample) else h.arrival for h in of_fusion]
+    assert told == arrivals
+    answering.undeclare()
+    receiver.close()
+
+
+def test_commands_and_points_are_dropped_when_nobody_records(wire):
+    cockpit, _, _ = wire
+    receiver = Receiver(cockpit, {"left": "left"})
+    receiver._enqueue("left", "left/cmd", 5, _Bytes(b"command"), 1.0)
+    receiver._enqueue("left", "left/points", 5, _Bytes(b"points"), 1.0)
+    assert receiver.drain().heard == ()
+    receiver.close()
+
+
+def test_points_that_nobody_fetches_do_not_fill_the_memory(wire):
+    cockpit, _, _ = wire
+    receiver = Receiver(cockpit, {"left": "left"}, everything=True)
+    cloud = _Bytes(bytes(BESIDE_BYTES // 8))
+    for _ in range(11):
+        receiver._enqueue("left", "left/points", 5, cloud, 1.0)
+    drained = receiver.drain()
+    assert len(drained.heard) == 8
+    assert drained.lost == 3
+    receiver.close()

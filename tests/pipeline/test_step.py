@@ -14,7 +14,7 @@ from backend.fusion.samples import Fix, FixSample, HeadingSample, JointSample
 from backend.machine.load import load_machine
 from backend.pipeline.config import Config
 from backend.pipeline.images import SunParameters, ordered_pairs, pair_image
-from backend.pipeline.records import ImageStamp, Inputs, Snapshot
+from backend.pipeline.records import ImageStamp, Inputs, Notice, Snapshot
 from backend.pipeline.step import initial, step
 from backend.safety.partner import Limits
 from backend.safety.record import Level
@@ -220,3 +220,26 @@ def test_images_are_stamped_with_the_state_they_show(config: Config) -> None:
     assert image.key == "a<-b"
     assert image.state_time == snapshot.state_time
     assert image.sun.current.d == pytest.approx(snapshot.machines["a"].body.reach, abs=1e-6)
+
+
+def test_notices_keep_the_time_since_when_they_hold(config: Config) -> None:
+    state = initial(config)
+    full, slow = Notice("recording", "disk full"), Notice("recording", "disk slow")
+    other = Notice("other", "something else")
+    told = [(), (full,), (slow, other), (other,), (full,)]
+    found = []
+    for cycle, notices in enumerate(told):
+        state, snapshot = step(state, Inputs(notices=notices), 10.0 + cycle, config)
+        found.append([(n.key, n.line, n.since) for n in snapshot.notices])
+        assert snapshot_document(snapshot, config)["notices"] == [
+            {"key": key, "line": line, "since": since} for key, line, since in found[-1]
+        ]
+        # Beside the alarms, which stay what they are.
+        assert {alarm.concern.level for alarm in snapshot.alarms} == {Level.UNKNOWN}
+    assert found == [
+        [],
+        [("recording", "disk full", 11.0)],
+        [("recording", "disk slow", 11.0), ("other", "something else", 12.0)],
+        [("other", "something else", 12.0)],
+        [("recording", "disk full", 14.0)],
+    ]

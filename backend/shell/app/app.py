@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -28,6 +27,7 @@ from backend.shell.app.models import (
     WhatIfModel,
     WhatIfRequest,
 )
+from backend.shell.app.recording import RecordingSources, recording_router
 from backend.shell.app.wire import dumps
 
 STATIC = Path(__file__).resolve().parents[3] / "static"
@@ -45,7 +45,7 @@ class Sources:
 
     backend: live timings; on_message: what a page asks of the views (camera, own machine);
     what_if: judges a posture, called with a machine and joint values by role, in a worker thread;
-    raises InputError for what it does not know.
+    raises InputError for what it does not know; recording: None where nothing is ever recorded.
     """
 
     site: dict[str, Any]
@@ -53,12 +53,16 @@ class Sources:
     backend: Callable[[], dict[str, Any]]
     on_message: Callable[[dict[str, Any]], None]
     what_if: Callable[[str, dict[str, float]], dict[str, Any]]
+    recording: RecordingSources | None = None
 
 
 def create_app(
-    sources: Sources, viewer: APIRouter | None = None, hosts: tuple[str, ...] = ("*",)
+    sources: Sources,
+    viewer: APIRouter | None = None,
+    hosts: tuple[str, ...] = ("*",),
+    routers: tuple[APIRouter, ...] = (),
 ) -> FastAPI:
-    """The application. viewer: routes of the 3D view, served below /view.
+    """The application. viewer: routes of the 3D view, served below /view; routers: more routes.
 
     hosts: names under which it answers. A page that binds to the loopback answers to no other
     name, so that a foreign name that resolves to the loopback leads nowhere.
@@ -138,8 +142,10 @@ def create_app(
         await websocket.accept()
         await feed.serve(websocket)
 
-    if viewer is not None:
-        app.include_router(viewer)
+    if sources.recording is not None:
+        app.include_router(recording_router(sources.recording))
+    for router in (*routers, *((viewer,) if viewer is not None else ())):
+        app.include_router(router)
     app.mount("/static", StaticFiles(directory=STATIC), name="static")
     return app
 
@@ -158,7 +164,7 @@ def _health(newest: Snapshot | None, sources: Sources) -> dict[str, Any]:
     backend = sources.backend()
     machines = {} if newest is None else newest.machines
     status = [backend["failure"]] if backend["failure"] else []
-    age = None if newest is None else time.monotonic() - newest.time
+    age = sources.frames.hub.age()
     if age is None:
         status.append("no cycle has finished yet")
     elif age > 0.5:

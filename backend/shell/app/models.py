@@ -111,6 +111,14 @@ class AlarmModel(BaseModel):
     active: bool = Field(description="past its on-delay")
 
 
+class NoticeModel(BaseModel):
+    """What an operator should know about the cockpit itself; not a safety level."""
+
+    key: str = Field(description="what it is about, such as recording")
+    line: str = Field(description="in words")
+    since: float = Field(description="local monotonic clock [s]")
+
+
 class FreedomModel(BaseModel):
     """One joint, one way. Bodies count as grown by eta."""
 
@@ -165,13 +173,39 @@ class SnapshotModel(BaseModel):
     margins: dict[str, MarginsModel] = Field(description="by own machine")
     concerns: list[ConcernModel]
     alarms: list[AlarmModel] = Field(description="the severest first")
+    notices: list[NoticeModel] = Field(
+        default_factory=list, description="beside the alarms, about the cockpit itself"
+    )
     images: dict[str, ImageStampModel] = Field(description="newest image by kind and pair")
     health: HealthCountersModel
     backend: BackendModel | None = Field(None, description="of the process that answers")
     resolution: dict[str, ResolutionModel] = Field(
         default_factory=dict, description="Sun 2020, Section 5.1, live"
     )
+    recording: RecordingStateModel | None = Field(None, description="of this backend")
     demo: DemoModel | None = Field(None, description="only in the demo")
+    playback: PlaybackModel | None = Field(None, description="only in playback")
+
+
+class RecordingStateModel(BaseModel):
+    state: str = Field(description="on, off or trouble")
+    text: str = Field(description="since when it is on, why it is off, or what is wrong")
+
+
+class PlaybackModel(BaseModel):
+    """Where the cursor of a recorded session is. Times are seconds since its beginning."""
+
+    time: float = Field(description="of the cursor [s]")
+    duration: float = Field(description="of the session [s]")
+    wall: float = Field(description="of the cursor, since 1970 [s]")
+    playing: bool
+    speed: float = Field(description="times real time")
+    source: str = Field(description="recorded: as it was; evaluated: as judged by this program")
+    sources: list[str] = Field(description="that the session has")
+    loop: list[float] | None = Field(description="begin and end of what is repeated [s]")
+    catching_up: bool = Field(description="slower than asked for, to let nothing out")
+    title: str
+    note: str = Field(description="what a viewer must know, else empty")
 
 
 class ResolutionModel(BaseModel):

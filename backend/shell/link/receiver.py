@@ -6,6 +6,7 @@ Decoding happens in `drain`, in the caller's thread.
 
 from __future__ import annotations
 
+import heapq
 import threading
 import time
 from collections import Counter, deque
@@ -18,7 +19,7 @@ from backend.fusion.samples import ClockSample, Sample
 from backend.shell.link.codec import DecodeError, decode, decode_clock
 from backend.shell.link.messages import AgentStatus, Command, TrueState
 from backend.shell.link.session import zenoh_congestion, zenoh_priority
-from backend.shell.link.topics import Direction, key, match, topic
+from backend.shell.link.topics import Direction, Topic, key, match, topic
 
 QUEUE = 8192  # messages: 8 s of four machines at full rate
 POLL_PERIOD = 0.5  # [s] between two questions for a machine's clock
@@ -26,6 +27,19 @@ POLL_TIMEOUT = 1.0  # [s]
 FOREIGN_KEYS = ("*/gnss/*", "*/status")  # slow streams that betray machines the site does not list
 MAX_LABELS = 100
 NOT_FOR_FUSION = ("points",)  # not decoded here
+BESIDE_BYTES = 64 * 2**20  # of messages that are only recorded
+
+
+@dataclass(frozen=True, slots=True)
+class Heard:
+    """One message as it came. key: Zenoh's; suffix: below the machine's prefix; arrival [s]."""
+
+    machine: str
+    key: str
+    suffix: str
+    row: Topic
+    payload: bytes
+    arrival: float
 
 
 @dataclass(frozen=True)
@@ -34,28 +48,23 @@ class Drained:
 
     samples: in order of arrival. malformed: (key, messages) that could not be decoded or are on no
     known topic. foreign: messages of machines that the site does not list. lost: messages dropped
-    because the queue was full. All are counts since the last `drain`.
+    because the queue was full. All are counts since the last `drain`. heard: everything to be
+    recorded, as it came, in order of arrival.
     """
 
     samples: tuple[Sample, ...]
     malformed: tuple[tuple[str, int], ...]
     foreign: tuple[tuple[str, int], ...]
     lost: int
-
-
-@dataclass(frozen=True)
-class _Raw:
-    machine: str
-    suffix: str
-    payload: bytes
-    arrival: float
+    heard: tuple[Heard | ClockSample, ...] = ()
 
 
 class Receiver:
     """Subscribes to the machines of a site and asks for their clocks.
 
     machines: key prefix on the wire -> the site's name of the machine. clock: the local clock that
-    arrivals and round trips are told by [s].
+    arrivals and round trips are told by [s]. everything: also what only a recorder wants, such as
+    commands and clouds of points.
     """
 
     def __init__(
@@ -64,6 +73,7 @@ class Receiver:
         machines: Mapping[str, str],
         clock: Callable[[], float] = time.monotonic,
         poll_period: float = POLL_PERIOD,
+        everything: bool = False,
     ) -> None:
         for prefix in machines:
             if not prefix or any(c in prefix for c in "*$?#{} ") or prefix.strip("/") != prefix:
@@ -73,7 +83,10 @@ class Receiver:
         self._session = session
         self._machines = dict(machines)
         self._clock = clock
-        self._queue: deque[_Raw | ClockSample] = deque()
+        self._queue: deque[Heard | ClockSample] = deque()
+        self._everything = everything
+        self._beside: deque[Heard] = deque()
+        self._beside_bytes = 0
         self._lock = threading.Lock()
         self._malformed: Counter[str] = Counter()
         self._foreign: Counter[str] = Counter()
@@ -101,6 +114,7 @@ class Receiver:
             malformed, self._malformed = self._malformed, Counter()
             foreign, self._foreign = self._foreign, Counter()
             lost, self._lost = self._lost, 0
+            beside, self._beside, self._beside_bytes = self._beside, deque(), 0
         samples: list[Sample] = []
         for item in raw:
             if isinstance(item, ClockSample):
@@ -117,7 +131,11 @@ class Receiver:
                 self._truths[item.machine] = message
             elif not isinstance(message, Command):
                 samples.append(message)
-        return Drained(tuple(samples), tuple(malformed.items()), tuple(foreign.items()), lost)
+        heard = [item for item in raw if isinstance(item, ClockSample) or item.row.recorded]
+        if beside:
+            heard = list(heapq.merge(heard, beside, key=_arrival))  # keeps the order of either
+        counts = tuple(malformed.items()), tuple(foreign.items())
+        return Drained(tuple(samples), *counts, lost, tuple(heard))
 
     def statuses(self) -> dict[str, AgentStatus]:
         """The newest status of each machine's agent by the site's names, as of the last `drain`."""
@@ -150,24 +168,35 @@ class Receiver:
 
         def on_sample(sample: Any) -> None:
             arrival = self._clock()
-            self._enqueue(machine, str(sample.key_expr)[skip:], sample.payload, arrival)
+            self._enqueue(machine, str(sample.key_expr), skip, sample.payload, arrival)
 
         return on_sample
 
-    def _enqueue(self, machine: str, suffix: str, payload: Any, arrival: float) -> None:
+    def _enqueue(self, machine: str, key_: str, skip: int, payload: Any, arrival: float) -> None:
         if self._closed.is_set():
             return
+        suffix = key_[skip:]
         found = match(suffix)
-        if found is not None and (
-            found[0].direction is not Direction.FROM_MACHINE or found[0].name in NOT_FOR_FUSION
-        ):
-            return  # commands of cockpits, our own among them, and clouds of points
         if found is None or len(payload) > found[0].max_bytes:  # not worth copying
-            self._count(self._malformed, f"{machine}/{suffix}")
+            if found is None or _for_fusion(found[0]):
+                self._count(self._malformed, f"{machine}/{suffix}")
             return
-        self._append(_Raw(machine, suffix, payload.to_bytes(), arrival))
+        row = found[0]
+        if _for_fusion(row):
+            self._append(Heard(machine, key_, suffix, row, payload.to_bytes(), arrival))
+        elif self._everything and row.recorded:
+            self._put_beside(Heard(machine, key_, suffix, row, payload.to_bytes(), arrival))
 
-    def _append(self, item: _Raw | ClockSample) -> None:
+    def _put_beside(self, item: Heard) -> None:
+        """Commands of cockpits, ours among them, and clouds of points: nobody waits for them."""
+        with self._lock:
+            self._beside.append(item)
+            self._beside_bytes += len(item.payload)
+            while self._beside_bytes > BESIDE_BYTES or len(self._beside) > QUEUE:
+                self._beside_bytes -= len(self._beside.popleft().payload)
+                self._lost += 1
+
+    def _append(self, item: Heard | ClockSample) -> None:
         with self._lock:
             self._queue.append(item)
             if len(self._queue) > QUEUE:
@@ -212,3 +241,11 @@ class Receiver:
             congestion_control=zenoh_congestion(row),
             express=row.express,
         )
+
+
+def _for_fusion(row: Topic) -> bool:
+    return row.direction is Direction.FROM_MACHINE and row.name not in NOT_FOR_FUSION
+
+
+def _arrival(item: Heard | ClockSample) -> float:
+    return item.received if isinstance(item, ClockSample) else item.arrival

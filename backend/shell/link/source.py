@@ -2,18 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
+from backend.fusion.samples import ClockSample
 from backend.pipeline.records import Inputs
-from backend.shell.link.receiver import Receiver
+from backend.shell.link.receiver import Heard, Receiver
 
 
 class LinkSource:
-    """Drains a receiver into one cycle's inputs."""
+    """Drains a receiver into one cycle's inputs. tap: gets what is to be recorded of each cycle."""
 
-    def __init__(self, receiver: Receiver) -> None:
+    def __init__(
+        self,
+        receiver: Receiver,
+        tap: Callable[[tuple[Heard | ClockSample, ...]], None] = lambda _: None,
+    ) -> None:
         self._receiver = receiver
+        self._tap = tap
 
     def take(self) -> Inputs:
         drained = self._receiver.drain()
+        self._tap(drained.heard)
         return Inputs(
             samples=drained.samples,
             malformed=drained.malformed,

@@ -124,7 +124,7 @@ def _concluded(name: str, template: str, priority: Priority, rate: str, descript
         priority=priority,
         congestion=Congestion.BLOCK if blocking else Congestion.DROP,
         express=blocking,
-        recorded=True,
+        recorded="{" not in template,  # images follow from the poses
         direction=Direction.FROM_COCKPIT,
         max_bytes=16_777_216,
         description=description,

@@ -71,8 +71,10 @@ SCHEMAS: dict[str, dict[str, Any]] = {
     ALARM: _object("Alarms", {"alarms": {"type": "array"}}, {}),
     # what an operator did on a page
     ACTION: _object("Action", {"action": _TEXT}, {"page": _TEXT, "details": {"type": "object"}}),
-    # kind: "note", "near miss", "pin"; text: in an operator's words
-    MARKER: _object("Marker", {"kind": _TEXT, "text": _TEXT}, {"machine": _TEXT}),
+    # kind: "note", "near miss", "pin"; text: in an operator's words; details: of a near miss
+    MARKER: _object(
+        "Marker", {"kind": _TEXT, "text": _TEXT}, {"machine": _TEXT, "details": {"type": "object"}}
+    ),
 }
 """JSON Schema of every topic of ours."""
 
@@ -138,8 +140,17 @@ class Message:
 
 
 def stamp(time: float, offset: int) -> int:
-    """[ns since 1970] of `time` [s] on the monotonic clock."""
-    return round(time * 1e9) + offset
+    """[ns since 1970] of `time` [s] on the monotonic clock.
+
+    After weeks that clock's float is coarser than a nanosecond, and the product is rounded once
+    more: the nearest neighbour that gives `time` again is taken.
+    """
+    near = round(time * 1e9)
+    for away in range(17):
+        for count in (near + away, near - away):
+            if count / 1e9 == time:
+                return count + offset
+    return near + offset
 
 
 def seconds(log_time: int, offset: int) -> float:

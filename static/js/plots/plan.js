@@ -2,11 +2,11 @@
 
 import { C, hatch, size } from "../theme.js";
 import { degrees, metres, number } from "../axis.js";
-import { clear, legend, message, swatches } from "../pen.js";
+import { clear, legend, message, playbackMark, swatches } from "../pen.js";
 import { $, partName, write } from "../words.js";
 import { staleText } from "../head.js";
 import { edgeDistance, inside } from "../geometry.js";
-import { image, imageAge, imageStale, label as nameOf, machine, names, pair, snapshotAge, state, zoneImage } from "../state.js";
+import { image, imageAge, imageStale, label as nameOf, machine, names, pair, replaying, snapshotAge, state, zoneImage } from "../state.js";
 import { shownZone } from "../view.js";
 import { surface } from "../surface.js";
 import {
@@ -75,6 +75,7 @@ function paint(g, width, height, dpr) {
   const zones = exact ? drawZones(g, exact, dpr, stale) : null;
   if (!exact) drawZone(g, zone, dpr, stale ? C.stale : C.partner);
   else if (how === "difference") outlineSun(g, zone);
+  if (replaying()) playbackMark(g, box);
   for (const name of names()) circles(g, name);
   obstacles(g);
   for (const name of names()) if (name !== state.own) outlines(g, name);
@@ -98,7 +99,7 @@ function paint(g, width, height, dpr) {
   ]);
   return {
     state: {
-      own: state.own, partner: state.partner, width: view.width, centre: view.centre, up: view.tracksUp ? "tracks" : "north",
+      own: state.own, partner: state.partner, playback: replaying(), width: view.width, centre: view.centre, up: view.tracksUp ? "tracks" : "north",
       base: own.position?.slice(0, 2), zone: zone.length, zones, shown: how, zone_stale: stale, exit, nearest, machines: names().filter((name) => machine(name)?.outlines).length,
     },
     age,

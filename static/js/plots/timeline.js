@@ -5,8 +5,10 @@ import { number, scale, ticks } from "../axis.js";
 import { clear, label, segment } from "../pen.js";
 import { levelMark } from "../glyphs.js";
 import { $ } from "../words.js";
-import { severity, silence, snapshotAge, state } from "../state.js";
+import { replaying, severity, silence, snapshotAge, state } from "../state.js";
 import { surface } from "../surface.js";
+import * as track from "./track.js";
+import { trackPointer } from "./track_pointer.js";
 
 const SPAN = 60;
 let map = null;
@@ -56,4 +58,9 @@ function probe(x) {
   return hits.length ? hits.map((e) => `${e.label}  (${number(now - e.start, 0)} s ago${e.end === null ? ", still on" : `, for ${number(e.end - e.start, 1)} s`})`) : [`${number(-ago, 0)} s ago: no alarm`];
 }
 
-export const timeline = () => surface($("timeline"), paint, probe);
+/** Live the last minute; of a recorded session all of it, with the cursor. */
+export function timeline() {
+  const s = surface($("timeline"), (...given) => (replaying() ? track.paint : paint)(...given), (x) => (replaying() ? track.probe : probe)(x));
+  trackPointer(s);
+  return s;
+}

@@ -1,0 +1,178 @@
+"""What a page asks of a running cockpit, live or in playback; nothing here can reach a machine."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+from collections.abc import Callable
+from dataclasses import asdict
+from typing import Any
+
+from rich.console import Console
+from rich.progress import Progress
+
+from backend.errors import InputError
+from backend.machine.load import load_machine
+from backend.machine.model import Machine
+from backend.pipeline.config import Config
+from backend.pipeline.images import SunParameters
+from backend.pipeline.records import Snapshot
+from backend.pipeline.whatif import touches, what_if
+from backend.safety.partner import Limits
+from backend.shell.hub import Hub
+from backend.shell.image_loops import ImageLoop
+from backend.shell.image_worker import ImageWorker
+from backend.shell.kinds import EXACT, REGIONS, SUN, ZONE, Recipe, Wishes
+from backend.site.bodies import site_bodies
+from backend.site.site import Site
+from backend.spatial.types import Array
+from cockpit.views.server import View
+
+MAX_HEIGHT = 50.0  # of a picked bucket tip above or below the swing joint [m]
+LOOPBACK = ("127.0.0.1", "localhost", "::1")
+_LOOPS = (("images", (SUN, EXACT), "image_hz"), ("zones", (ZONE, REGIONS), "zone_hz"))
+"""Name, kinds, and which of the site's rates; each loop has a process of its own."""
+
+
+def load_models(site: Site) -> dict[str, Machine]:
+    """Every machine's description; a bar is shown while bodies are fitted to meshes."""
+    models: dict[str, Machine] = {}
+    loaded: dict[tuple[str, str | None], Machine] = {}
+    with Progress(console=Console(stderr=True), transient=True) as bar:
+        for machine in site.machines:
+            key = (machine.model, machine.sidecar)
+            if key not in loaded:
+                task = bar.add_task(f"{machine.name}: {machine.model}", total=1.0)
+
+                def progress(text: str, share: float, task: Any = task) -> None:
+                    bar.update(task, completed=share, description=text)
+
+                sidecar = None if machine.sidecar is None else site.folder / machine.sidecar
+                try:
+                    loaded[key] = load_machine(machine.model, sidecar, site.folder, progress)
+                except InputError as error:
+                    raise InputError(f"{site.path}: machine {machine.name}: {error}") from error
+                bar.update(task, completed=1.0)
+            models[machine.name] = loaded[key]
+    return models
+
+
+def make_config(site: Site, models: dict[str, Machine], own: tuple[str, ...], mode: str) -> Config:
+    """The pipeline's configuration; `own` empty means every machine."""
+    for name in own:
+        site.machine(name)
+    return Config(
+        frame=site.frame,
+        machines=models,
+        labels={machine.name: machine.label for machine in site.machines},
+        own=own or tuple(models),
+        limits=Limits(site.safety.slow_below, site.safety.stop_below),
+        eta=site.safety.eta,
+        mode=mode,
+        site=site_bodies(site),
+    )
+
+
+def image_loops(site: Site, config: Config, closing: contextlib.ExitStack) -> tuple[ImageLoop, ...]:
+    """All loops that make images of a site, each with a process that ends with `closing`."""
+    sun = SunParameters(site.sun.m, site.sun.n, site.sun.eta)
+    loops = []
+    for name, kinds, rate in _LOOPS:
+        worker = ImageWorker(Recipe(config, sun, kinds))
+        closing.callback(worker.close)
+        loops.append(ImageLoop(name, getattr(site.rates, rate), worker))
+    return tuple(loops)
+
+
+class Desk:
+    """Answers pages: what-if, ghosts, cameras, heights of reach images.
+
+    view: the 3D scene's; action: told what an operator did, on which page, with what details.
+    """
+
+    def __init__(
+        self,
+        config: Config,
+        hub: Hub,
+        view: Callable[[], View],
+        action: Callable[[str, str | None, dict[str, Any]], None] = lambda *_: None,
+    ) -> None:
+        self._config = config
+        self._hub = hub
+        self._view = view
+        self._action = action
+        self._tip_heights: dict[str, float] = {}
+
+    def wishes(self) -> Wishes:
+        """What operators chose of the images."""
+        return Wishes(dict(self._tip_heights))
+
+    def what_if(self, own: str, joints: dict[str, float]) -> dict[str, Any]:
+        """python-fcl's verdict on a posture of `own`; joints that are not named stay."""
+        snapshot = self._hub.latest()
+        if own not in self._config.own:
+            known = ", ".join(self._config.own)
+            raise InputError(f'machine is "{own}"; allowed are {known}.')
+        if snapshot is None:
+            raise InputError("no cycle has finished yet; try again.")
+        q = self._posture(own, joints, snapshot)
+        self._action("whatif", None, {"machine": own, "joints": joints})
+        found = what_if(snapshot, self._config, own, q)
+        roles = [joint.role for joint in self._config.machines[own].joints]
+        posture = dict(zip(roles, q.tolist(), strict=True))
+        return {**asdict(found), "joints": posture, "checked_by": "python-fcl"}
+
+    def on_message(self, message: dict[str, Any]) -> None:
+        """What a page asks of the scene and the images; anything else is ignored."""
+        page, name = message.get("page"), message.get("name", message.get("machine"))
+        kind = message.get("type")
+        if not (page is None or isinstance(page, str)):
+            return
+        if isinstance(kind, str):
+            self._action(kind, page, message)
+        with contextlib.suppress(ValueError, InputError):
+            if kind == "ghost":
+                self._show_ghost(name, message.get("joints"), page)
+            elif kind == "zones":
+                self._view().set_zone_kind(str(message.get("kind")), page)
+            elif not isinstance(name, str):
+                return
+            elif kind == "camera":
+                self._view().set_camera(name, page)
+            elif kind == "own":
+                self._view().set_own(name, page)
+            elif kind == "tip_height" and name in self._config.own:
+                self._pick_height(name, message.get("height"))
+
+    def _posture(self, own: str, joints: dict[str, float], snapshot: Snapshot) -> Array:
+        """(n,) the present joint values of a machine with those of `joints` in their places."""
+        machine = self._config.machines[own]
+        roles = [joint.role for joint in machine.joints]
+        unknown = [role for role in joints if role not in roles]
+        if unknown:
+            raise InputError(f"joints.{unknown[0]} is unknown; allowed are {', '.join(roles)}.")
+        q = snapshot.machines[own].pose.joints.copy()
+        for role, value in joints.items():
+            if not isinstance(value, int | float) or not math.isfinite(value):
+                raise InputError(f"joints.{role} is {value!r}; allowed is an angle in radians.")
+            q[roles.index(role)] = value
+        return q
+
+    def _show_ghost(self, machine: Any, joints: Any, page: str | None) -> None:
+        """A ghost in another posture; red where it would touch something."""
+        snapshot = self._hub.latest()
+        if machine is None or not isinstance(joints, dict) or snapshot is None:
+            self._view().set_ghost(None, page=page)
+            return
+        touched = None
+        if machine in self._config.own:
+            q = self._posture(machine, joints, snapshot)
+            touched = touches(snapshot, self._config, machine, q)
+        self._view().set_ghost(machine, joints, page, touched)
+
+    def _pick_height(self, own: str, height: Any) -> None:
+        """The height of a machine's reach image, for all pages; None: as the tip is."""
+        if height is None:
+            self._tip_heights.pop(own, None)
+        elif isinstance(height, int | float) and abs(height) < MAX_HEIGHT:
+            self._tip_heights[own] = float(height)
