@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from backend.pipeline.config import Config
 from backend.pipeline.records import MachineState
 from backend.safety.approach import Approach, Motion, approach, joined
 from backend.safety.braking import accelerations, full_speeds, stopping_distance
+from backend.safety.record import Concern, Evidence, Level
 
 LONGEST_DELAY = 0.7
 """Delays up to this are looked ahead for; above, motion is locked anyway [s]."""
@@ -47,6 +48,27 @@ def approach_of(
             )
         )
     return joined(parts) if parts else None
+
+
+def unknown_ages(
+    machines: Mapping[str, MachineState], now: float, config: Config
+) -> Iterable[Concern]:
+    """One concern for every own machine while the age of its data or a partner's is not known.
+
+    Ages that count from arrival leave out the way, and braking distances would be too short.
+    """
+    silent = [
+        name
+        for name, state in machines.items()
+        if state.body is not None and state.pose.streams["joints"].age_source != "offset"
+    ]
+    for own in config.own if silent else ():
+        label = config.labels[own if own in silent else silent[0]]
+        n = len(config.machines[own].joints)
+        nothing = Evidence(own, "", float("nan"), None, float("inf"))
+        reason = f"{label} clock is silent: age unknown"
+        zeros = np.zeros((n, 2)), np.zeros(2)
+        yield Concern("age", own, Level.UNKNOWN, reason, *zeros, nothing, now)
 
 
 def motion_of(state: MachineState) -> Motion:

@@ -17,7 +17,7 @@ from backend.fusion.pose import FusedPose
 from backend.fusion.rig import Rig, make_rig
 from backend.fusion.samples import Sample
 from backend.fusion.streams import Streams, ingest
-from backend.pipeline.braking import approach_of
+from backend.pipeline.braking import approach_of, unknown_ages
 from backend.pipeline.config import Config
 from backend.pipeline.margins import machine_margins
 from backend.pipeline.place import base_transform, place
@@ -65,6 +65,8 @@ def step(state: State, inputs: Inputs, now: float, config: Config) -> tuple[Stat
         else {}
     )
     concerns = tuple(_partner(name, machines, close, unknown, now, config) for name in config.own)
+    if config.drive:
+        concerns += tuple(unknown_ages(machines, now, config))
     raised = alarms.update(state.alarms, concerns, now)
     health = _health(state.health, inputs, strangers)
     notices = _notices(state.notices, inputs.notices, now)
