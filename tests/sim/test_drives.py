@@ -12,13 +12,13 @@ from backend.pipeline.place import place
 from backend.shell.sim.drives import SETTLE, Careless, Drive, drive, twin
 from backend.spatial import transform
 
-SOON = [(5, ("mini", "ex13")), (38, ("ex13", "mini"))]
-"""Drives that end in contact within 8 s when nothing is limited."""
+SOON = [(5, ("mini", "ex13")), (12, ("mini", "mini")), (10, ("ex13", "mini"))]
+"""Drives that end in contact within 6 s when nothing is limited."""
 
 
 @pytest.mark.parametrize(("seed", "models"), SOON)
 def test_what_ends_in_contact_does_not_with_the_limiter(seed, models) -> None:
-    plan = Drive(seed, models, seconds=9.0)
+    plan = Drive(seed, models, seconds=6.0)
     free = drive(twin(plan))
     assert free.contact is not None
     limited = drive(plan)

@@ -177,7 +177,10 @@ class Hands(Protocol):
 
 
 class Careless:
-    """Sticks thrown to and fro at full deflection, each on its own."""
+    """Sticks thrown to and fro at full deflection, each on its own.
+
+    Pedals rest more often than sticks, so that the machines do not soon drive out of reach.
+    """
 
     def __init__(self, rng: np.random.Generator) -> None:
         self._rng = rng
@@ -187,7 +190,8 @@ class Careless:
     def at(self, t: float) -> Sticks:
         for k in np.flatnonzero(t >= self._until):
             self._until[k] = t + 0.2 + self._rng.exponential(1.0)
-            self._value[k] = self._rng.choice([-1.0, 0.0, 1.0], p=[0.4, 0.2, 0.4])
+            odds = [0.4, 0.2, 0.4] if k < 4 else [0.15, 0.7, 0.15]
+            self._value[k] = self._rng.choice([-1.0, 0.0, 1.0], p=odds)
         return Sticks(*(float(v) for v in self._value)) if t > SETTLE else Sticks()
 
 
@@ -318,7 +322,7 @@ def _placed(machines: Sequence[Machine], rng: np.random.Generator) -> list[SimSt
     """Two machines at rest within each other's reach, `CLEAR_AT_START` apart at least."""
     reach = sum(machine.max_reach for machine in machines)
     while True:
-        apart = rng.uniform(0.45, 0.95) * reach
+        apart = rng.uniform(0.35, 0.65) * reach
         direction = rng.uniform(-math.pi, math.pi)
         there = apart * np.array([math.cos(direction), math.sin(direction), 0.0])
         states = [
