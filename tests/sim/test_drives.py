@@ -9,7 +9,8 @@ from backend.collision.verdict import contact
 from backend.control.patterns import Sticks, neutral
 from backend.machine.load import load_machine
 from backend.pipeline.place import place
-from backend.shell.sim.drives import SETTLE, Careless, Drive, drive, twin
+from backend.shell.sim.careless import SETTLE, Careless
+from backend.shell.sim.drives import Drive, drive, twin
 from backend.spatial import transform
 
 SOON = [(5, ("mini", "ex13")), (12, ("mini", "mini")), (10, ("ex13", "mini"))]

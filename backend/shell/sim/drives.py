@@ -11,7 +11,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from typing import Protocol
 
 import numpy as np
 
@@ -20,7 +19,6 @@ from backend.control.lease import Kind, Request
 from backend.control.patterns import Setting, Sticks, velocities
 from backend.fusion.pose import Validity
 from backend.fusion.samples import ClockSample, Sample
-from backend.machine import kinematics
 from backend.machine.load import load_machine
 from backend.machine.model import Machine
 from backend.pipeline.config import Config
@@ -34,18 +32,15 @@ from backend.shell.link.codec import decode
 from backend.shell.link.messages import AgentStatus, Command, MotionLimits, TrueState
 from backend.shell.link.topics import key
 from backend.shell.sim import dynamics
+from backend.shell.sim.careless import SETTLE, Careless, Hands, bodies_of, fastest, placed
 from backend.shell.sim.dynamics import Demand, Hydraulics, SimState
 from backend.shell.sim.radio import OnAir, Radio, receive, send
 from backend.shell.sim.sensors import Sensor, sensors
 from backend.site.site import Site, load_site
-from backend.spatial.boxes import Boxes
-from backend.spatial.types import Array
 
 DT = 0.01  # of the simulated machines [s]
 CYCLE = 0.02  # of the backend [s]
 NAMES = ("a", "b")
-SETTLE = 1.0  # before the sticks move [s]
-CLEAR_AT_START = 0.6  # [m]
 
 
 @dataclass(frozen=True)
@@ -114,7 +109,7 @@ def drive(plan: Drive, hands: Sequence[Hands] | None = None) -> Outcome:
     site = replace(site, sim=site.sim.model_copy(update={"joint_period": DT}))
     rng = np.random.default_rng((plan.seed, 7))
     machines = [machine_of(model) for model in plan.models]
-    states = _placed(machines, rng)
+    states = placed(machines, rng)
     fleet = [
         _machine(name, machine, state, site, plan.seed)
         for name, machine, state in zip(NAMES, machines, states, strict=True)
@@ -133,7 +128,7 @@ def drive(plan: Drive, hands: Sequence[Hands] | None = None) -> Outcome:
     radios = Radio(site.sim.radio_period, plan.down), Radio(site.sim.radio_period, plan.up)
     sticks = hands or [Careless(np.random.default_rng((plan.seed, k))) for k in range(2)]
     outcome, pipeline = Outcome(), initial(config)
-    fastest = sum(_fastest(m) for m in machines)
+    top_speed = sum(fastest(m) for m in machines)
     safe_until = clock_due = shown_due = cycle_due = 0.0
     samples: list[Sample] = []
     for tick in range(1, round(plan.seconds / DT) + 1):
@@ -159,40 +154,15 @@ def drive(plan: Drive, hands: Sequence[Hands] | None = None) -> Outcome:
             outcome.path.append((fleet[0].path, fleet[1].path))
             outcome.driven.append((fleet[0].driven, fleet[1].driven))
         if t >= safe_until:
-            first, second = (_bodies(m.machine, m.state) for m in fleet)
+            first, second = (bodies_of(m.machine, m.state) for m in fleet)
             touches, apart = contact(first, second)
             outcome.nearest = min(outcome.nearest, apart)
             if touches:
                 outcome.contact = t
                 break
             # Nothing touches before the machines could have come together at their fastest.
-            safe_until = t + apart / fastest
+            safe_until = t + apart / top_speed
     return outcome
-
-
-class Hands(Protocol):
-    """An operator's hands."""
-
-    def at(self, t: float) -> Sticks: ...
-
-
-class Careless:
-    """Sticks thrown to and fro at full deflection, each on its own.
-
-    Pedals rest more often than sticks, so that the machines do not soon drive out of reach.
-    """
-
-    def __init__(self, rng: np.random.Generator) -> None:
-        self._rng = rng
-        self._until = np.zeros(6)
-        self._value = np.zeros(6)
-
-    def at(self, t: float) -> Sticks:
-        for k in np.flatnonzero(t >= self._until):
-            self._until[k] = t + 0.2 + self._rng.exponential(1.0)
-            odds = [0.4, 0.2, 0.4] if k < 4 else [0.15, 0.7, 0.15]
-            self._value[k] = self._rng.choice([-1.0, 0.0, 1.0], p=odds)
-        return Sticks(*(float(v) for v in self._value)) if t > SETTLE else Sticks()
 
 
 def _machine(name: str, machine: Machine, state: SimState, site: Site, seed: int) -> _Machine:
@@ -302,45 +272,6 @@ def _count(outcome: Outcome, decision: Decision, snapshot: Snapshot, name: str) 
         reason = "data: " + "; ".join(pose.reasons).split(" are ")[0].split(" is ")[0]
     if reason:
         outcome.reasons[reason] = outcome.reasons.get(reason, 0) + 1
-
-
-def _bodies(machine: Machine, state: SimState) -> Boxes:
-    return kinematics.body_boxes(
-        machine, kinematics.link_poses(machine, state.q, state.T_site_root)
-    )
-
-
-def _fastest(machine: Machine) -> float:
-    """No point of the machine is ever faster [m/s]."""
-    levers = machine.stretched_levers.max(axis=0)
-    tracks = machine.tracks
-    turning = 2.0 * tracks.max_speed / tracks.gauge * (machine.bounding_radius + tracks.length)
-    return float(levers @ machine.max_velocity) + tracks.max_speed + turning
-
-
-def _placed(machines: Sequence[Machine], rng: np.random.Generator) -> list[SimState]:
-    """Two machines at rest within each other's reach, `CLEAR_AT_START` apart at least."""
-    reach = sum(machine.max_reach for machine in machines)
-    while True:
-        apart = rng.uniform(0.35, 0.65) * reach
-        direction = rng.uniform(-math.pi, math.pi)
-        there = apart * np.array([math.cos(direction), math.sin(direction), 0.0])
-        states = [
-            _somewhere(machine, position, rng)
-            for machine, position in zip(machines, (np.zeros(3), there), strict=True)
-        ]
-        bodies = [_bodies(m, s) for m, s in zip(machines, states, strict=True)]
-        touches, gap = contact(bodies[0], bodies[1])
-        if not touches and gap >= CLEAR_AT_START:
-            return states
-
-
-def _somewhere(machine: Machine, position: Array, rng: np.random.Generator) -> SimState:
-    low = np.where(np.isfinite(machine.lower), machine.lower, -math.pi)
-    high = np.where(np.isfinite(machine.upper), machine.upper, math.pi)
-    q = rng.uniform(low + 0.1 * (high - low), high - 0.1 * (high - low))
-    yaw = float(rng.uniform(-math.pi, math.pi))
-    return SimState(q, np.zeros_like(q), position, yaw, 0.0, 0.0, np.zeros(2))
 
 
 def twin(plan: Drive) -> Drive:
