@@ -18,6 +18,10 @@ from backend.cspace.regions import regions
 from backend.machine.load import load_machine, shipped_machines
 from backend.machine.outline import outlines_of
 from backend.pipeline.place import place
+from backend.safety.approach import Motion, approach
+from backend.safety.limiter import Wish, limit, open_latch
+from backend.safety.limits import Delay
+from backend.safety.record import Concern, Level
 from backend.spatial import rotation, transform
 from backend.spatial.boxes import Boxes
 
@@ -32,6 +36,13 @@ def compile_kernels() -> None:
     closest_pairs(near, near)
     outlines_of(machine, near)
     margins(machine, q, near, 0.1, np.full(len(q), 0.01))
+    motion = Motion(body.link_poses, body.link_poses[0], q, np.zeros(3), 0.0)
+    rows = approach(machine, motion, machine, motion, "partner", 0.3, 0.1, 0.7)
+    concern = Concern(
+        *("partner", "own", Level.CLEAR, "", np.ones((len(q), 2)), np.ones(2), None, 0.0, rows)
+    )
+    wish = Wish(machine.max_velocity, np.ones(2))
+    limit("own", machine, q, wish, (concern,), Delay(0.1, 0.2), open_latch(machine), 0.0)
     layers = {"partner": near}
     joint4(machine, layers, (3, 3, 3, 3))
     free = certified4(machine, layers, 0.1, (3, 3, 3, 3)).certified_free()

@@ -117,6 +117,28 @@ def sim(
 
 
 @app.command()
+def agent(
+    site: Site,
+    machine: Annotated[str, typer.Option(help="Name of the machine of the site it runs on.")],
+    driver: Annotated[str, typer.Option(help="What is driven: sim or can.")] = "sim",
+    connect: Connect = None,
+    interface: Annotated[
+        str, typer.Option(help="python-can interface, e.g. socketcan, pcan, virtual.")
+    ] = "socketcan",
+    channel: Annotated[str, typer.Option(help="CAN channel, e.g. can0.")] = "can0",
+    bitrate: Annotated[int, typer.Option(help="CAN bit rate [bit/s].")] = 250_000,
+    dbc: Annotated[
+        Path | None, typer.Option(help="CAN frames; scenes/can/agent.dbc unless told otherwise.")
+    ] = None,
+) -> None:
+    """Run a machine's own agent: it grants the lease, obeys its holder and enforces limits."""
+    from cockpit.run import run_agent
+
+    can = (interface, channel, bitrate, dbc)
+    run_agent(site, machine, driver, can, tuple(connect or ()), until=_interrupted())
+
+
+@app.command()
 def assess(
     state: Annotated[Path, typer.Option(help="State document (.json), or one per line (.jsonl).")],
     site: Annotated[

@@ -1,4 +1,4 @@
-"""The long-running commands: demo, serve, sim."""
+"""The long-running commands: demo, serve, sim, agent."""
 
 from __future__ import annotations
 
@@ -8,9 +8,11 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
+from backend.errors import InputError
+from backend.machine.model import Machine
 from backend.shell.link.session import with_port
 from backend.site.site import Site, load_site
 from cockpit.announce import announce
@@ -104,6 +106,35 @@ def run_sim(
     site = load_site(site_name)
     site.machine(machine)
     run(site, machine, connect or (LIVE,), start_at, until)
+
+
+def run_agent(
+    site_name: str,
+    machine: str,
+    driver: str,
+    can: tuple[str, str, int, Path | None],
+    connect: tuple[str, ...],
+    until: threading.Event,
+) -> None:
+    """One machine's agent, until interrupted. can: interface, channel, bit rate, DBC file."""
+    from backend.shell.agent.drivers.driver import Driver
+    from backend.shell.agent.drivers.simulation import SimDriver
+    from backend.shell.agent.process import run
+
+    if driver not in ("sim", "can"):
+        raise InputError(f'--driver "{driver}" is unknown; allowed are sim, can.')
+
+    def make(description: Machine, clock: Callable[[], float]) -> Driver:
+        if driver == "sim":
+            return SimDriver(description, clock)
+        from backend.shell.agent.drivers.bus import DBC, CanDriver, open_bus
+
+        interface, channel, bitrate, dbc = can
+        return CanDriver(description, open_bus(interface, channel, bitrate), clock, dbc or DBC)
+
+    site = load_site(site_name)
+    site.machine(machine)
+    run(site, machine, connect or (LIVE,), until, make)
 
 
 @contextlib.contextmanager

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from backend.shell.link.topics import topics_markdown
+from backend.shell.link.topics_table import topics_markdown
 from cockpit.schemas import SCHEMAS
 
 

@@ -49,3 +49,18 @@ def verdict(a: Boxes, b: Boxes, pairs: IntArray | None = None) -> Verdict:
 
 def _collides(a: object, b: object) -> bool:
     return bool(fcl.collide(a, b, fcl.CollisionRequest(), fcl.CollisionResult()))
+
+
+def contact(a: Boxes, b: Boxes, reach: float = 0.0) -> tuple[bool, float]:
+    """(whether any body of a touches one of b by python-fcl, how far apart they are at least [m]).
+
+    reach: pairs that are farther apart than this [m] are not looked at; 0 for all that may touch.
+    """
+    bound = lower_bounds(a, b)
+    apart = float(bound.min(initial=np.inf))
+    for i, j in np.argwhere(bound <= reach):
+        one = fcl_box(a.centers[i], a.rotations[i], a.half_extents[i])
+        two = fcl_box(b.centers[j], b.rotations[j], b.half_extents[j])
+        if _collides(one, two):
+            return True, 0.0
+    return False, apart

@@ -74,6 +74,7 @@ def fuse(rig: Rig, streams: Streams, now: float, common: float) -> FusedPose:
         fix=fix,
         streams=status,
         clock_offset=offset[:2] if offset and offset[2] == "offset" else None,
+        yaw_rate=course.rate,
     )
 
 

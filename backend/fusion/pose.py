@@ -37,7 +37,7 @@ class FusedPose:
 
     position: (3,) of the URDF root; yaw: of the root (tracks), CCW from grid east;
     joints, joint_velocities: (n,) in the order of Machine.joints [rad, rad/s];
-    base_velocity: (3,) [m/s]; sigmas are standard deviations.
+    base_velocity: (3,) [m/s]; yaw_rate: of the tracks [rad/s]; sigmas are standard deviations.
     When validity is not VALID the last known values stay, for drawing only.
     """
 
@@ -58,3 +58,4 @@ class FusedPose:
     fix: Fix
     streams: dict[str, StreamStatus]  # "joints", "position", "heading", "attitude"
     clock_offset: tuple[float, float] | None  # bounds of local minus remote [s]
+    yaw_rate: float = 0.0

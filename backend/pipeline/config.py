@@ -16,7 +16,8 @@ class Config:
 
     eta: configured inflation [m]; far: beyond this gap of two machines' workspaces no exact
     distance is computed [m]; site: what stands on the site; stop_latency: from asking a machine to
-    stop to its first braking [s].
+    stop to its first braking [s]; margins: whether joints' margins are computed; drive: whether
+    somebody may drive, so that braking distances are judged.
     """
 
     frame: SiteFrame
@@ -29,3 +30,5 @@ class Config:
     far: float = 15.0
     site: SiteBodies = NO_SITE_BODIES
     stop_latency: float = 0.3
+    margins: bool = True
+    drive: bool = False

@@ -17,6 +17,7 @@ from backend.fusion.pose import FusedPose
 from backend.fusion.rig import Rig, make_rig
 from backend.fusion.samples import Sample
 from backend.fusion.streams import Streams, ingest
+from backend.pipeline.braking import approach_of, unknown_ages
 from backend.pipeline.config import Config
 from backend.pipeline.margins import machine_margins
 from backend.pipeline.place import base_transform, place
@@ -58,8 +59,14 @@ def step(state: State, inputs: Inputs, now: float, config: Config) -> tuple[Stat
         for name, rig in state.rigs.items()
     }
     pairs, close, unknown = measure(machines, config)
-    margins = {name: machine_margins(name, machines, pairs, config) for name in config.own}
-    concerns = tuple(_partner(name, close, unknown, now, config) for name in config.own)
+    margins = (
+        {name: machine_margins(name, machines, pairs, config) for name in config.own}
+        if config.margins
+        else {}
+    )
+    concerns = tuple(_partner(name, machines, close, unknown, now, config) for name in config.own)
+    if config.drive:
+        concerns += tuple(unknown_ages(machines, now, config))
     raised = alarms.update(state.alarms, concerns, now)
     health = _health(state.health, inputs, strangers)
     notices = _notices(state.notices, inputs.notices, now)
@@ -117,6 +124,7 @@ def _placed(pose: FusedPose, rig: Rig) -> Body3D | None:
 
 def _partner(
     name: str,
+    machines: dict[str, MachineState],
     close: dict[str, list[Proximity]],
     unknown: dict[str, str],
     now: float,
@@ -125,7 +133,8 @@ def _partner(
     joints = len(config.machines[name].joints)
     if name in unknown:
         return partner.unknown(name, joints, unknown[name], now)
-    return partner.judge(name, joints, tuple(close[name]), config.limits, now)
+    braking = approach_of(name, machines, now, config) if config.drive else None
+    return partner.judge(name, joints, tuple(close[name]), config.limits, now, braking)
 
 
 def _notices(

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from backend.safety.approach import Approach
 from backend.safety.record import Concern, Evidence, Level
 from backend.safety.scaling import allowed_speeds, linear
 from backend.spatial.types import Array
@@ -40,12 +41,22 @@ class Proximity:
 
 
 def judge(
-    machine: str, joints: int, pairs: tuple[Proximity, ...], limits: Limits, now: float
+    machine: str,
+    joints: int,
+    pairs: tuple[Proximity, ...],
+    limits: Limits,
+    now: float,
+    approach: Approach | None = None,
 ) -> Concern:
-    """CLEAR, SLOW or STOP from all close pairs of one machine; pairs may be empty."""
+    """CLEAR, SLOW or STOP from all close pairs of one machine; pairs may be empty.
+
+    approach: what braking is judged by, where somebody drives.
+    """
     free = np.ones((joints, 2)), np.ones(2)
     if not pairs:
-        return Concern("partner", machine, Level.CLEAR, "no machine near", *free, None, now)
+        return Concern(
+            "partner", machine, Level.CLEAR, "no machine near", *free, None, now, approach
+        )
     margins = np.array([p.margin for p in pairs])
     fractions = linear(margins, limits.stop_below, limits.slow_below)
     allowed = allowed_speeds(np.array([p.gradient for p in pairs]), fractions)
@@ -60,7 +71,7 @@ def judge(
     ttc = max(nearest.distance, 0.0) / closing if closing > 1e-3 else float("inf")
     evidence = Evidence(nearest.own, nearest.other, nearest.distance, nearest.points, ttc)
     reason = f"{part(nearest.own)} is {max(nearest.distance, 0.0):.2f} m from {nearest.other}"
-    return Concern("partner", machine, level, reason, allowed, travel, evidence, now)
+    return Concern("partner", machine, level, reason, allowed, travel, evidence, now, approach)
 
 
 def unknown(machine: str, joints: int, reason: str, now: float) -> Concern:

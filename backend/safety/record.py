@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import IntEnum
 
+from backend.safety.approach import Approach
 from backend.spatial.types import Array
 
 
@@ -36,7 +37,8 @@ class Concern:
     """One concern's verdict on one machine.
 
     allowed: (n, 2) fraction of full speed, 0..1, per joint and direction (negative, positive);
-    travel: (2,) the same for driving (backward, forward).
+    travel: (2,) the same for driving (backward, forward); approach: what its braking distances are
+    judged by, None where the fractions say it all.
     """
 
     name: str  # "partner", "gauge", "self", "people", "tip-over", "stale"
@@ -47,3 +49,4 @@ class Concern:
     travel: Array
     evidence: Evidence | None
     time: float
+    approach: Approach | None = None

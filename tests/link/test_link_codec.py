@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import random
 import struct
@@ -21,8 +22,8 @@ from backend.fusion.samples import (
     ProjectedSample,
 )
 from backend.shell.link import encode
-from backend.shell.link.codec import DecodeError, decode, decode_clock, fix_quality
-from backend.shell.link.messages import TYPESTORE, AgentStatus, Command, TrueState
+from backend.shell.link.codec import DecodeError, decode, decode_clock, decode_limits, fix_quality
+from backend.shell.link.messages import TYPESTORE, AgentStatus, Command, MotionLimits, TrueState
 from backend.spatial.angles import difference
 from backend.spatial.rotation import from_attitude, to_quaternion
 
@@ -31,6 +32,17 @@ finite = st.floats(-1e6, 1e6)
 
 COMMAND = Command(
     "left", STAMP, 2.0, 17, 0.2, "ann", 4, ("swing", "boom"), np.array([0.1, -0.2]), 0.3, -0.3
+)
+LIMITS = MotionLimits(
+    "left",
+    STAMP,
+    2.0,
+    3,
+    0.3,
+    4,
+    ("swing", "track_left"),
+    np.array([0.1, 1.0]),
+    np.array([0.0, 0.5]),
 )
 STATUS = AgentStatus("left", STAMP, 2.0, "remote", "ann", 4, 17, 0.03, 1.0, 18, 2)
 TRUTH = TrueState(
@@ -77,6 +89,17 @@ def assert_same(a, b):
 )
 def test_own_messages_round_trip(suffix, record):
     assert_same(decode("left", suffix, GOOD[suffix], 2.0), record)
+
+
+def test_limits_round_trip_and_broken_ones_are_refused():
+    payload = encode.encode_limits(LIMITS)
+    assert_same(decode_limits("left", payload, 2.0), LIMITS)
+    for cut in range(0, len(payload), 3):
+        with pytest.raises(DecodeError):
+            decode_limits("left", payload[:cut], 2.0)
+    short = encode.encode_limits(dataclasses.replace(LIMITS, positive=np.zeros(1)))
+    with pytest.raises(DecodeError, match="values of positive"):
+        decode_limits("left", short, 2.0)
 
 
 @given(

@@ -10,7 +10,7 @@ import pytest
 
 from backend.documents.snapshot import snapshot_document
 from backend.fusion.pose import Validity
-from backend.fusion.samples import Fix, FixSample, HeadingSample, JointSample
+from backend.fusion.samples import ClockSample, Fix, FixSample, HeadingSample, JointSample
 from backend.machine.load import load_machine
 from backend.pipeline.config import Config
 from backend.pipeline.images import SunParameters, ordered_pairs, pair_image
@@ -243,3 +243,41 @@ def test_notices_keep_the_time_since_when_they_hold(config: Config) -> None:
         [("other", "something else", 12.0)],
         [("recording", "disk full", 14.0)],
     ]
+
+
+def test_braking_is_judged_only_where_somebody_drives(config: Config) -> None:
+    def last(changed: Config, clocks: bool = True) -> Snapshot:
+        state = initial(changed)
+        for k in range(30):
+            now = k * 0.02
+            told = inputs(changed, now)
+            if clocks and k % 10 == 0:
+                trips = tuple(ClockSample(m, now - 0.002, now - 0.001, now) for m in ("a", "b"))
+                told = dataclasses.replace(told, samples=trips + told.samples)
+            state, snapshot = step(state, told, now, changed)
+        return snapshot
+
+    watched = last(config)
+    assert all(concern.approach is None for concern in watched.concerns)
+    driving = dataclasses.replace(config, drive=True, margins=False)
+    driven = last(driving)
+    assert driven.margins == {}
+    assert len(driven.concerns) == 2
+    for concern in driven.concerns:
+        part = concern.approach
+        assert part is not None
+        assert len(part.room) > 0
+        # p_l, and what both poses may be wrong by, are taken off.
+        assert part.room.min() <= driven.pairs[0].distance - config.limits.stop_below
+        assert part.age == pytest.approx(0.03, abs=0.01)
+    # Everything else is the same, and documents do not carry it.
+    assert [c.level for c in driven.concerns] == [c.level for c in watched.concerns]
+    for a, b in zip(driven.concerns, watched.concerns, strict=True):
+        np.testing.assert_array_equal(a.allowed, b.allowed)
+    dumps({"snapshot": snapshot_document(driven, config)})
+
+    # Without round trips to the machines' clocks the age is not known: nothing may move.
+    blind = last(driving, clocks=False)
+    ages = [c for c in blind.concerns if c.name == "age"]
+    assert [c.machine for c in ages] == ["a", "b"]
+    assert all(c.level is Level.UNKNOWN and not c.allowed.any() for c in ages)

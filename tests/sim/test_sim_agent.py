@@ -8,9 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from backend.control.lease import Kind, Request
 from backend.machine.load import load_machine
-from backend.shell.link.messages import Command
-from backend.shell.sim.agent import RESUME_AFTER, TIME_TO_LIVE, Mode, act, fresh, hear
+from backend.shell.agent.gate import TIME_TO_LIVE, hear, hear_limits, names_of, negotiate
+from backend.shell.link.messages import Command, MotionLimits
+from backend.shell.sim.agent import RESUME_AFTER, Mode, act, fresh
 from backend.shell.sim.dynamics import Hydraulics, limits_of, step
 from backend.shell.sim.program import reference
 from backend.shell.sim.program_file import load_program
@@ -23,6 +25,30 @@ LEFT = load_program(MACHINE, SITE, "left")
 HOLD = replace(LEFT, script=(), cycle=(), script_length=0.0)
 LIMITS, LAGS = limits_of(MACHINE), Hydraulics()
 DT = 0.01
+
+
+ONES = np.ones(6)
+
+
+def limits(sequence=1, token=1):
+    """Every motion free."""
+    return MotionLimits("left", 0.0, 0.0, sequence, 0.2, token, names_of(MACHINE), ONES, ONES)
+
+
+def leased(agent, now=0.0):
+    """The agent after "ann" asked for its lease, or refreshed it."""
+    lease = agent.gate.lease
+    kind = Kind.REFRESH if lease.held(now) else Kind.REQUEST
+    gate, answer = negotiate(agent.gate, Request(kind, "ann", token=lease.token), now)
+    assert answer.granted
+    return replace(agent, gate=gate)
+
+
+def commanded(agent, said, now):
+    """The agent after a command and fresh limits with the same token."""
+    gate = hear(agent.gate, said, MACHINE, now)
+    free = limits(1 + (gate.limits.sequence if gate.limits else 0), said.token)
+    return replace(agent, gate=hear_limits(gate, free, MACHINE, now))
 
 
 def command(sequence=1, token=1, velocity=(0.2,), names=("swing",), ttl=0.2, travel=(0.0, 0.0)):
@@ -44,9 +70,11 @@ class Run:
         while self.t < t - 1e-9:
             self.t += DT
             if commands:
-                self.agent = hear(self.agent, commands(self.t), MACHINE, self.t)
+                self.agent = leased(self.agent, self.t)
+                said = replace(commands(self.t), token=self.agent.gate.lease.token)
+                self.agent = commanded(self.agent, said, self.t)
             before = self.state.qd
-            self.agent, state, demand = act(self.agent, self.program, LAGS, self.state, self.t)
+            self.agent, state, demand = act(self.agent, self.program, LAGS, self.state, self.t, DT)
             self.state = step(state, demand, LIMITS, LAGS, DT)
             self.worst_jump = max(self.worst_jump, float(np.abs(self.state.qd - before).max()))
         return self
@@ -103,35 +131,12 @@ def test_a_machine_without_a_program_stays_where_it_was_left():
     np.testing.assert_allclose(run.state.qd, 0.0, atol=1e-9)
 
 
-def test_replayed_old_and_unsound_commands_are_refused():
-    agent = fresh(LEFT)
-    agent = hear(agent, command(5, token=2), MACHINE, 1.0)
-    assert (agent.accepted, agent.refused) == (1, 0)
-    for bad in (
-        command(5, token=2),  # replayed
-        command(4, token=2),  # overtaken
-        command(99, token=1),  # of an older holder
-        command(6, token=2, velocity=(math.nan,)),
-        command(6, token=2, velocity=(math.inf,)),
-        command(6, token=2, ttl=0.0),
-        command(6, token=2, ttl=math.nan),
-        command(6, token=2, names=("wing",)),
-        command(6, token=2, travel=(math.nan, 0.0)),
-    ):
-        after = hear(agent, bad, MACHINE, 1.1)
-        assert after.refused == agent.refused + 1
-        assert after.command is agent.command
-        assert after.heard_at == agent.heard_at
-    assert hear(agent, command(6, token=2), MACHINE, 1.1).accepted == 2
-    assert hear(agent, command(1, token=3), MACHINE, 1.1).accepted == 2  # a new holder starts anew
-
-
 def test_a_long_time_to_live_is_cut_to_the_machines_own():
-    agent = hear(fresh(LEFT), command(ttl=60.0), MACHINE, 0.0)
+    agent = commanded(leased(fresh(LEFT)), command(ttl=60.0), 0.0)
     state = on_schedule(LEFT, 0.0, np.zeros(3), 0.0, 0.0, 0.0)
-    assert act(agent, LEFT, LAGS, state, 0.19)[0].mode is Mode.REMOTE
-    agent = act(agent, LEFT, LAGS, state, 0.19)[0]
-    agent, _, demand = act(agent, LEFT, LAGS, state, 0.21)
+    agent = act(agent, LEFT, LAGS, state, 0.19, DT)[0]
+    assert agent.mode is Mode.REMOTE
+    agent, _, demand = act(agent, LEFT, LAGS, state, 0.21, DT)
     assert agent.mode is Mode.STOPPED
     np.testing.assert_array_equal(demand.joints, 0.0)
     np.testing.assert_array_equal(demand.travel, 0.0)
@@ -140,8 +145,18 @@ def test_a_long_time_to_live_is_cut_to_the_machines_own():
 def test_urdf_names_and_travel_are_obeyed():
     names = tuple(joint.name for joint in MACHINE.joints)
     said = command(velocity=(0.1, 0.2, -0.3, 0.4), names=names, travel=(0.2, -0.2))
-    agent = hear(fresh(LEFT), said, MACHINE, 0.0)
+    agent = commanded(leased(fresh(LEFT)), said, 0.0)
     state = on_schedule(LEFT, 0.0, np.zeros(3), 0.0, 0.0, 0.0)
-    _, _, demand = act(agent, LEFT, LAGS, state, 0.1)
+    _, _, demand = act(agent, LEFT, LAGS, state, 0.1, 10.0)
     np.testing.assert_array_equal(demand.joints, [0.1, 0.2, -0.3, 0.4])
     np.testing.assert_array_equal(demand.travel, [0.2, -0.2])
+
+
+def test_without_a_lease_the_program_goes_on():
+    """Strangers' commands do not even interrupt it."""
+    run = Run(LEFT).until(2.0)
+    before = run.agent
+    run.agent = commanded(run.agent, command(token=0), run.t)
+    run.until(3.0)
+    assert run.agent.mode is Mode.PROGRAM
+    assert run.agent.gate.refused == before.gate.refused + 2  # the command and its limits

@@ -21,8 +21,8 @@ from backend.fusion.samples import (
     ProjectedSample,
     Sample,
 )
-from backend.shell.link.messages import TYPESTORE, AgentStatus, Command, TrueState
-from backend.shell.link.topics import Topic, match
+from backend.shell.link.messages import TYPESTORE, AgentStatus, Command, MotionLimits, TrueState
+from backend.shell.link.topics import Topic, match, topic
 from backend.spatial.rotation import from_quaternion, to_attitude
 from backend.spatial.types import Array
 
@@ -264,3 +264,26 @@ def decode_clock(payload: bytes) -> float:
     if time.sec < 0 or time.nanosec >= 1_000_000_000:
         raise DecodeError(f"clock: {time.sec} s + {time.nanosec} ns is no time")
     return float(time.sec + 1e-9 * time.nanosec)
+
+
+def decode_limits(machine: str, payload: bytes, arrival: float) -> MotionLimits:
+    """The motion limits in `payload`; arrival: local clock [s]. Raises DecodeError."""
+    try:
+        msg = _message(topic("limits"), payload)
+        arrays = {"negative": msg.negative, "positive": msg.positive}
+        names = _names(msg.name, arrays, may_be_empty=())
+        return MotionLimits(
+            machine,
+            _stamp(msg),
+            arrival,
+            int(msg.sequence),
+            float(msg.time_to_live),
+            int(msg.token),
+            names,
+            _array(msg.negative),
+            _array(msg.positive),
+        )
+    except DecodeError:
+        raise
+    except Exception as error:  # whatever strangers' bytes provoke in the decoder
+        raise DecodeError(f"limits: {error}") from error

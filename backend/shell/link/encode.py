@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from backend.fusion.samples import Fix
-from backend.shell.link.messages import TYPESTORE, AgentStatus, Command, TrueState
+from backend.shell.link.messages import TYPESTORE, AgentStatus, Command, MotionLimits, TrueState
 from backend.spatial.types import Array
 
 _Time = TYPESTORE.types["builtin_interfaces/msg/Time"]
@@ -22,6 +22,7 @@ _NavSatFix = TYPESTORE.types["sensor_msgs/msg/NavSatFix"]
 _NavSatStatus = TYPESTORE.types["sensor_msgs/msg/NavSatStatus"]
 _PointStamped = TYPESTORE.types["geometry_msgs/msg/PointStamped"]
 _Command = TYPESTORE.types["cockpit_msgs/msg/JointVelocityCommand"]
+_Limits = TYPESTORE.types["cockpit_msgs/msg/MotionLimits"]
 _Status = TYPESTORE.types["cockpit_msgs/msg/AgentStatus"]
 _Truth = TYPESTORE.types["cockpit_msgs/msg/TrueState"]
 
@@ -131,6 +132,21 @@ def encode_command(command: Command) -> bytes:
             _vector(command.velocity),
             command.travel_left,
             command.travel_right,
+        )
+    )
+
+
+def encode_limits(limits: MotionLimits) -> bytes:
+    """cockpit_msgs/MotionLimits."""
+    return _bytes(
+        _Limits(
+            _header(limits.stamp, ""),
+            limits.sequence,
+            limits.time_to_live,
+            limits.token,
+            list(limits.names),
+            _vector(limits.negative),
+            _vector(limits.positive),
         )
     )
 

@@ -27,15 +27,27 @@ float64 travel_left       # [m/s], positive forwards
 float64 travel_right      # [m/s]
 """
 
+MOTION_LIMITS = """\
+# How fast each motion may be, as fractions of full speed. The machine cuts every command to them;
+# without limits younger than time_to_live it stands still, and so does what is not named.
+std_msgs/Header header
+uint64 sequence
+float64 time_to_live      # [s]
+uint64 token              # fencing token of the lease
+string[] name             # joint names or roles, "track_left", "track_right"
+float64[] negative        # 0..1
+float64[] positive        # 0..1
+"""
+
 AGENT_STATUS = """\
 # What the machine's own agent does.
 std_msgs/Header header
-string mode               # "program", "remote", "stopped", "rejoining" or "hold"
-string holder             # of the newest accepted command, empty when none
-uint64 token
+string mode               # "remote", "stopped" or "hold"; simulated: "program", "rejoining", too
+string holder             # of the lease, empty when nobody holds it
+uint64 token              # the newest issued
 uint64 sequence           # of the newest accepted command
 float64 command_age       # [s], -1 when no command was ever accepted
-float64 limit             # applied fraction of full speed, 0..1
+float64 limit             # least fraction of full speed in any direction, 0..1
 uint64 accepted
 uint64 refused
 """
@@ -56,6 +68,7 @@ float64 travel_right      # [m/s]
 
 DEFINITIONS = {
     "cockpit_msgs/msg/JointVelocityCommand": JOINT_VELOCITY_COMMAND,
+    "cockpit_msgs/msg/MotionLimits": MOTION_LIMITS,
     "cockpit_msgs/msg/AgentStatus": AGENT_STATUS,
     "cockpit_msgs/msg/TrueState": TRUE_STATE,
 }
@@ -86,6 +99,21 @@ class Command:
     velocity: Array
     travel_left: float
     travel_right: float
+
+
+@dataclass(frozen=True)
+class MotionLimits:
+    """Fractions of full speed, as MOTION_LIMITS. negative, positive: (k,) by name, 0..1."""
+
+    machine: str
+    stamp: float
+    arrival: float
+    sequence: int
+    time_to_live: float
+    token: int
+    names: tuple[str, ...]
+    negative: Array
+    positive: Array
 
 
 @dataclass(frozen=True)

@@ -78,6 +78,41 @@ def _pose(name: str, template: str, type_: str, rate: str, description: str) -> 
     )
 
 
+def _order(name: str, template: str, type_: str, description: str) -> Topic:
+    """What moves a machine: repeated with a time-to-live, and late is worthless."""
+    return Topic(
+        name=name,
+        template=template,
+        type=type_,
+        rate="20–50",
+        priority=Priority.REAL_TIME,
+        congestion=Congestion.DROP,
+        express=True,
+        recorded=True,
+        direction=Direction.TO_MACHINE,
+        max_bytes=16_384,
+        description=description,
+    )
+
+
+def _asked(name: str, template: str, type_: str, max_bytes: int, description: str) -> Topic:
+    """What a machine answers at once."""
+    return Topic(
+        name=name,
+        template=template,
+        type=type_,
+        rate="2",
+        priority=Priority.INTERACTIVE_HIGH,
+        congestion=Congestion.DROP,
+        express=True,
+        recorded=False,
+        direction=Direction.FROM_MACHINE,
+        max_bytes=max_bytes,
+        description=description,
+        queryable=True,
+    )
+
+
 def _concluded(name: str, template: str, priority: Priority, rate: str, description: str) -> Topic:
     """What a backend concluded, for other hosts. Only warnings may block: none may be lost."""
     blocking = priority is Priority.DATA_HIGH
@@ -145,19 +180,27 @@ TOPICS: tuple[Topic, ...] = (
         max_bytes=33_554_432,
         description="LiDAR points in the frame named by the header [m]",
     ),
-    Topic(
-        name="cmd",
-        template="{machine}/cmd",
-        type="cockpit_msgs/msg/JointVelocityCommand",
-        rate="20–50",
-        priority=Priority.REAL_TIME,
-        congestion=Congestion.DROP,
-        express=True,
-        recorded=True,
-        direction=Direction.TO_MACHINE,
-        max_bytes=16_384,
-        description="joint and track velocities with sequence and time-to-live; the machine stops "
-        "by itself when they cease",
+    _order(
+        "cmd",
+        "{machine}/cmd",
+        "cockpit_msgs/msg/JointVelocityCommand",
+        "joint and track velocities with sequence, time-to-live and the lease's token; "
+        "the machine stops by itself when they cease",
+    ),
+    _order(
+        "limits",
+        "{machine}/limits",
+        "cockpit_msgs/msg/MotionLimits",
+        "fractions of full speed per motion and direction, with sequence and "
+        "time-to-live; without fresh ones the machine stands still",
+    ),
+    _asked(
+        "lease",
+        "{machine}/lease",
+        "JSON",
+        4_096,
+        "request, refresh, release, hand over or take over the machine's lease; the answer holds "
+        "the fencing token that commands must carry",
     ),
     Topic(
         name="status",
@@ -172,19 +215,12 @@ TOPICS: tuple[Topic, ...] = (
         max_bytes=16_384,
         description="the machine agent's mode, holder, applied limit and age of the last command",
     ),
-    Topic(
-        name="clock",
-        template="{machine}/clock",
-        type="builtin_interfaces/msg/Time",
-        rate="2",
-        priority=Priority.INTERACTIVE_HIGH,
-        congestion=Congestion.DROP,
-        express=True,
-        recorded=False,
-        direction=Direction.FROM_MACHINE,
-        max_bytes=64,
-        description="the machine's clock, asked for by round trips; without it ages are by arrival",
-        queryable=True,
+    _asked(
+        "clock",
+        "{machine}/clock",
+        "builtin_interfaces/msg/Time",
+        64,
+        "the machine's clock, asked for by round trips; without it ages are by arrival",
     ),
     Topic(
         name="truth",
@@ -251,23 +287,3 @@ def match(suffix: str) -> tuple[Topic, dict[str, str]] | None:
         if found:
             return row, found.groupdict()
     return None
-
-
-def topics_markdown() -> str:
-    """The table as Markdown, for the README."""
-    head = "| key | type | Hz | priority | congestion | express | recorded | direction | what |"
-    lines = [head, "|" + "---|" * 9]
-    for row in TOPICS:
-        cells = (
-            f"`{row.template}`" + (" (queryable)" if row.queryable else ""),
-            row.type,
-            row.rate,
-            row.priority.value,
-            row.congestion.value,
-            "yes" if row.express else "no",
-            "yes" if row.recorded else "no",
-            row.direction.value,
-            row.description,
-        )
-        lines.append("| " + " | ".join(cells) + " |")
-    return "\n".join(lines) + "\n"

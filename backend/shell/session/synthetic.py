@@ -149,7 +149,7 @@ def _machine(
     found = []
     for k in range(round(length / DT)):
         t = k * DT
-        agent, state, demand = act(agent, program, lags, state, begin + t)
+        agent, state, demand = act(agent, program, lags, state, begin + t, DT)
         state = move(state, demand, limits, lags, DT)
         cut = is_cut(program, begin + t)
         for i, sensor in enumerate(rig):

@@ -1,26 +1,22 @@
-"""The machine's own agent: what it obeys, when it stops, how it finds back to its program.
+"""A simulated machine's agent: it obeys through the gate of every agent, and has a program.
 
-It obeys the newest command only while that is younger than its time-to-live, counted from arrival
-on the machine's own clock; a sequence is never obeyed twice, and an older token never.
+Between commands it stands; some time after the last one it finds back to its program.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import Enum
 
 import numpy as np
 
-from backend.machine.model import Machine
-from backend.shell.link.messages import Command
+from backend.shell.agent.gate import Gate, demand
 from backend.shell.sim.dynamics import Demand, Hydraulics, SimState, standstill
 from backend.shell.sim.motion import Motion, at, path_through, shortest
 from backend.shell.sim.program import Program, entry_posture, next_entry, reference
 from backend.spatial.types import Array
 
-TIME_TO_LIVE = 0.2
-"""The longest that one command is obeyed, whatever it says [s]."""
 RESUME_AFTER = 5.0
 """Standstill between the last command and the way back to the program [s]."""
 GAIN = 3.0
@@ -53,14 +49,14 @@ class Rejoin:
 
 @dataclass(frozen=True)
 class Agent:
-    """command: the newest accepted one; heard_at: when it arrived, schedule time [s]."""
+    """gate: what it obeys; asked: of the machine at the last step, (joints, tracks), None when it
+    was not commanded then.
+    """
 
     mode: Mode
-    command: Command | None = None
-    heard_at: float = -math.inf
-    accepted: int = 0
-    refused: int = 0
+    gate: Gate = field(default_factory=Gate)
     rejoin: Rejoin | None = None
+    asked: Demand | None = None
 
 
 def fresh(program: Program) -> Agent:
@@ -68,45 +64,27 @@ def fresh(program: Program) -> Agent:
     return Agent(Mode.PROGRAM if program.script or program.cycle else Mode.HOLD)
 
 
-def hear(agent: Agent, command: Command, machine: Machine, now: float) -> Agent:
-    """The agent after a command arrived at `now` [s]; refused commands are only counted."""
-    last = agent.command
-    newer = (
-        last is None
-        or command.token > last.token
-        or (command.token == last.token and command.sequence > last.sequence)
-    )
-    if not newer or not _sound(command, machine):
-        return replace(agent, refused=agent.refused + 1)
-    return replace(agent, command=command, heard_at=now, accepted=agent.accepted + 1)
-
-
-def _sound(command: Command, machine: Machine) -> bool:
-    known = {joint.name for joint in machine.joints} | {joint.role for joint in machine.joints}
-    travel = (command.travel_left, command.travel_right)
-    return (
-        0.0 < command.time_to_live < math.inf
-        and set(command.names) <= known
-        and bool(np.isfinite(command.velocity).all())
-        and all(math.isfinite(value) for value in travel)
-    )
-
-
 def act(
-    agent: Agent, program: Program, hydraulics: Hydraulics, state: SimState, now: float
+    agent: Agent,
+    program: Program,
+    hydraulics: Hydraulics,
+    state: SimState,
+    now: float,
+    dt: float,
 ) -> tuple[Agent, SimState, Demand]:
-    """What the machine is asked to do at `now` [s on the schedule].
+    """What the machine is asked to do at `now` [s on the schedule], dt [s] after the last time.
 
     The state comes back with the swing counted from another turn when the way back needs it, which
     moves nothing.
     """
-    command = agent.command
-    if command is not None and now - agent.heard_at < min(command.time_to_live, TIME_TO_LIVE):
-        agent = replace(agent, mode=Mode.REMOTE, rejoin=None)
-        return agent, state, demand_of(command, program.machine)
+    gate = agent.gate
+    if gate.obeys(now):
+        before = agent.asked or Demand(state.qd, state.travel)
+        asked = Demand(*demand(gate, program.machine, (before.joints, before.travel), now, dt))
+        return replace(agent, mode=Mode.REMOTE, rejoin=None, asked=asked), state, asked
     if agent.mode is Mode.REMOTE:
-        agent = replace(agent, mode=Mode.STOPPED)
-    if agent.mode is Mode.STOPPED and now - agent.heard_at >= RESUME_AFTER:
+        agent = replace(agent, mode=Mode.STOPPED, asked=None)
+    if agent.mode is Mode.STOPPED and now - gate.heard_at >= RESUME_AFTER:
         has_program = bool(program.script or program.cycle)
         agent = replace(agent, mode=Mode.REJOINING if has_program else Mode.HOLD)
     if agent.mode in (Mode.STOPPED, Mode.HOLD):
@@ -136,13 +114,6 @@ def follow(wanted: tuple[Array, Array, Array], q: Array, hydraulics: Hydraulics)
     """
     q_ref, qd_ref, qdd_ref = wanted
     return np.asarray(qd_ref + hydraulics.joint_lag * qdd_ref + GAIN * (q_ref - q))
-
-
-def demand_of(command: Command, machine: Machine) -> Demand:
-    """The velocities of a command in the order of Machine.joints; joints not named stand still."""
-    by_name = dict(zip(command.names, command.velocity, strict=True))
-    joints = [by_name.get(j.name, by_name.get(j.role, 0.0)) for j in machine.joints]
-    return Demand(np.array(joints), np.array([command.travel_left, command.travel_right]))
 
 
 def way_back(program: Program, q: Array, now: float) -> Rejoin:

@@ -5,20 +5,21 @@ from __future__ import annotations
 import math
 import threading
 import time
-from collections import deque
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from backend.control.lease import fresh as no_lease
 from backend.machine.load import load_machine
 from backend.machine.model import Machine
-from backend.shell.link.codec import DecodeError, decode
+from backend.shell.agent.status import status_of
+from backend.shell.agent.wire import Ear
 from backend.shell.link.encode import encode_clock, encode_status, encode_truth
-from backend.shell.link.messages import AgentStatus, Command, TrueState
+from backend.shell.link.messages import TrueState
 from backend.shell.link.session import open_session, publisher
 from backend.shell.link.topics import key, topic
-from backend.shell.sim.agent import Agent, act, fresh, hear
+from backend.shell.sim.agent import act, fresh
 from backend.shell.sim.dynamics import Hydraulics, SimState, limits_of, step
 from backend.shell.sim.program import Program, is_cut
 from backend.shell.sim.program_file import load_program
@@ -61,12 +62,11 @@ def run(
 
 @dataclass
 class _Wire:
-    """Publishers by topic name, the radio's messages, and commands waiting to be decoded."""
+    """Publishers by topic name, and the radio's messages."""
 
     outlets: dict[str, Any]
     radio: Radio
     on_air: tuple[OnAir[tuple[str, bytes]], ...] = ()
-    inbox: deque[bytes] = field(default_factory=lambda: deque(maxlen=64))
     cut: bool = False
 
 
@@ -101,18 +101,18 @@ def run_machine(
                 now = time.monotonic() + epoch + skew
                 query.reply(clock_key, encode_clock(now), express=topic("clock").express)
 
-    def on_command(sample: Any) -> None:
-        if len(sample.payload) <= topic("cmd").max_bytes:
-            wire.inbox.append(sample.payload.to_bytes())
+    def on_schedule_time() -> float:
+        return time.monotonic() + epoch - start_at
 
-    listening = [
-        session.declare_queryable(clock_key, on_clock),
-        session.declare_subscriber(key("cmd", prefix), on_command),
-    ]
+    answering = session.declare_queryable(clock_key, on_clock)
+    # Milliseconds since the epoch: a machine that is started again never issues a token twice.
+    first = no_lease(int(1e3 * time.time()))
+    ear = Ear(session, prefix, first, on_schedule_time, lambda: wire.cut)
     try:
-        _loop(site, name, machine, program, rig, wire, epoch, start_at, until, skew)
+        _loop(site, name, machine, program, rig, wire, ear, epoch, start_at, until, skew)
     finally:
-        for declared in (*listening, *wire.outlets.values()):
+        ear.close()
+        for declared in (answering, *wire.outlets.values()):
             declared.undeclare()
 
 
@@ -123,6 +123,7 @@ def _loop(
     program: Program,
     rig: tuple[Sensor, ...],
     wire: _Wire,
+    ear: Ear,
     epoch: float,
     start_at: float,
     until: threading.Event,
@@ -148,10 +149,10 @@ def _loop(
             due = [max(d, t) for d in due]
             status_due, truth_due = max(status_due, t), max(truth_due, t)
         wire.cut = is_cut(program, now - start_at)
-        agent = _commands(agent, machine, name, wire, now, start_at)
+        agent = replace(agent, gate=ear.hear(agent.gate, name, machine))
         while t + dt <= now:
             t += dt
-            agent, state, demand = act(agent, program, hydraulics, state, t - start_at)
+            agent, state, demand = act(agent, program, hydraulics, state, t - start_at, dt)
             state = step(state, demand, limits, hydraulics, dt)
             if is_cut(program, t - start_at):
                 wire.on_air = ()
@@ -163,7 +164,8 @@ def _loop(
                     wire.on_air = send(wire.on_air, t, message, wire.radio)
                     due[i] = max(due[i] + sensor.period, t - sensor.period)
             if t >= status_due - 1e-6:
-                status = encode_status(_status(agent, name, t + skew, t - start_at))
+                report = status_of(agent.gate, name, agent.mode.value, t + skew, t - start_at)
+                status = encode_status(report)
                 wire.on_air = send(wire.on_air, t, ("status", status), wire.radio)
                 status_due += STATUS_PERIOD
             if t >= truth_due - 1e-6:
@@ -174,40 +176,6 @@ def _loop(
         for outlet, payload in arrived:
             wire.outlets[outlet].put(payload)
         until.wait(max(0.0005, t + dt - (time.monotonic() + epoch)))
-
-
-def _commands(
-    agent: Agent, machine: Machine, name: str, wire: _Wire, now: float, start_at: float
-) -> Agent:
-    """The agent after all waiting commands; while the radio is cut they are lost."""
-    while wire.inbox:
-        payload = wire.inbox.popleft()
-        if wire.cut:
-            continue
-        try:
-            command = decode(name, topic("cmd").template.removeprefix("{machine}/"), payload, now)
-        except DecodeError:
-            continue
-        if isinstance(command, Command):
-            agent = hear(agent, command, machine, now - start_at)
-    return agent
-
-
-def _status(agent: Agent, name: str, stamp: float, now: float) -> AgentStatus:
-    last = agent.command
-    return AgentStatus(
-        machine=name,
-        stamp=stamp,
-        arrival=stamp,
-        mode=agent.mode.value,
-        holder=last.holder if last else "",
-        token=last.token if last else 0,
-        sequence=last.sequence if last else 0,
-        command_age=now - agent.heard_at if last else -1.0,
-        limit=1.0,
-        accepted=agent.accepted,
-        refused=agent.refused,
-    )
 
 
 def _truth(machine: Machine, site: Site, name: str, state: SimState, stamp: float) -> TrueState:

@@ -1,0 +1,1 @@
+"""Who drives which machine, in which state the console is, and what the sticks mean."""

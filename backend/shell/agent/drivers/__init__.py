@@ -1,0 +1,1 @@
+"""What an agent drives: a real machine's bus, or a simulation."""
