@@ -22,6 +22,7 @@ from backend.safety.braking import (
 from backend.safety.limiter import (
     LOCKED_ABOVE,
     OVERRIDE_FRACTION,
+    STANDING,
     Decision,
     Latch,
     Override,
@@ -157,7 +158,9 @@ def test_one_motion_stops_within_its_share(k: int, room: float, c: float, b: flo
     part = approach(row(room, {k: -c}, 0.0, {(k, k): -b}))
     v = speed(decide({k: 1.0}, concern(part)))[k]
     assert used(v, k, c, b) <= SHARE * room + 1e-9
-    if v < FULL[k] * (1 - 1e-9):  # not slower than needed
+    if v == 0.0:  # what would be slower than this stands
+        assert used(STANDING * FULL[k], k, c, b) >= SHARE * room - 1e-6
+    elif v < FULL[k] * (1 - 1e-9):  # not slower than needed
         assert used(v, k, c, b) >= SHARE * room - 1e-6
 
 
@@ -187,7 +190,8 @@ def test_motions_at_once_share_the_room(slopes, wish, room, w) -> None:
     total = float(toward @ stopping_distance(got, T, A))
     assert total <= SHARE * room + 2e-3 * M
     if w > 0.0 and total > 2e-3 * M:
-        slowest = max(T[k] + abs(got[k]) / A[k] for k in range(M) if toward[k] > 1e-3)
+        counted = np.where(toward > 1e-3, toward, 0.0) * stopping_distance(got, T, A) > 1e-4
+        slowest = max((T + np.abs(got) / A)[counted], default=0.0)
         assert total + w * slowest <= room + 2e-3 * M
     away = np.array(slopes) * np.sign(asked) >= 0.0
     np.testing.assert_allclose(got[away], asked[away])
