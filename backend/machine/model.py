@@ -177,7 +177,7 @@ class Machine:
             K = np.zeros((4, 4))
             K[:3, :3] = [[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]
             M[:, i] = link.T_parent_joint, link.T_parent_joint @ K, link.T_parent_joint @ K @ K
-        M.setflags(write=False)
+        # Left writable: a copy in another process is, and kernels are compiled for either kind.
         return M
 
     @cached_property

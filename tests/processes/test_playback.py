@@ -178,7 +178,7 @@ def test_commands_reach_nobody(playing: Backend) -> None:
                 frame = socket.recv(timeout=10.0)
                 assert isinstance(frame, bytes)
                 kinds.add(decode(frame)[0]["type"])
-        assert kinds <= {"site", "snapshot", "image"}, kinds
+        assert kinds <= {"site", "snapshot", "sun", "exact", "zone", "regions"}, kinds
         after = playing.get("/api/snapshot")["playback"]
         assert after["time"] == before["time"]
         subscriber.undeclare()
