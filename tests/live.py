@@ -13,6 +13,7 @@ import time
 import urllib.request
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 from websockets.sync.client import ClientConnection, connect
@@ -137,3 +138,28 @@ def frames(socket: ClientConnection, seconds: float) -> Iterator[tuple[float, di
         header, _ = decode(message)
         if header["type"] == "snapshot":
             yield time.monotonic(), header
+
+
+@contextlib.contextmanager
+def playback(path: Path, *options: str) -> Iterator[Backend]:
+    """`cockpit play PATH`, once its page is up."""
+    process = start("play", str(path), "--port", "0", "--no-browser", *options)
+    output: list[str] = []
+    ready = threading.Event()
+
+    def read() -> None:
+        assert process.stdout is not None
+        for line in process.stdout:
+            output.append(line.rstrip())
+            if "PLAYBACK" in line:
+                ready.set()
+        ready.set()
+
+    threading.Thread(target=read, daemon=True).start()
+    try:
+        assert ready.wait(90.0), output
+        found = re.search(r"http://\S+:\d+", "\n".join(output))
+        assert found, output
+        yield Backend(process, found[0], "", output)
+    finally:
+        end(process)

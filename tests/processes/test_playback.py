@@ -3,10 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
-import subprocess
-import sys
-import threading
 import time
 import urllib.request
 from collections.abc import Iterator
@@ -15,7 +11,7 @@ from typing import Any
 
 import jsonschema
 import pytest
-from live import ENVIRONMENT, Backend, end, frames
+from live import Backend, frames, playback
 from program import cockpit
 from websockets.sync.client import connect
 
@@ -40,35 +36,8 @@ def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def playing(path: Path) -> Iterator[Backend]:
-    process = subprocess.Popen(
-        [
-            *(sys.executable, "-m", "cockpit.cli", "play", str(path)),
-            *("--port", "0", "--no-browser"),
-        ],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        env=ENVIRONMENT,
-    )
-    output: list[str] = []
-    ready = threading.Event()
-
-    def read() -> None:
-        assert process.stdout is not None
-        for line in process.stdout:
-            output.append(line.rstrip())
-            if "PLAYBACK" in line:
-                ready.set()
-        ready.set()
-
-    threading.Thread(target=read, daemon=True).start()
-    try:
-        assert ready.wait(90.0), output
-        found = re.search(r"http://\S+:\d+", "\n".join(output))
-        assert found, output
-        yield Backend(process, found[0], "", output)
-    finally:
-        end(process)
+    with playback(path) as running:
+        yield running
 
 
 def order(backend: Backend, action: str, value: Any = None, /, **shown: Any) -> dict[str, Any]:
