@@ -22,8 +22,8 @@ from backend.shell.link.topics import match
 from backend.shell.session.recorder import NoRecorder, Recorder
 from backend.site.site import Site
 from cockpit.bench_input import cycles
+from cockpit.options import Options
 from cockpit.recording import make_recorder
-from cockpit.station import Options
 
 CYCLE = 0.02  # [s]
 TARGET = 10.0  # of one core, both processes together [%]

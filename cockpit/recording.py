@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from backend.pipeline.config import Config
 from backend.shell.app.recording import RecordingSources
@@ -14,9 +14,7 @@ from backend.shell.session.keeper import Plan
 from backend.shell.session.recorder import NoRecorder, Recorder
 from backend.shell.session.ring import Limits, parts_of, recordings_of, recordings_root
 from backend.site.site import Site
-
-if TYPE_CHECKING:
-    from cockpit.station import Options
+from cockpit.options import Options
 
 
 def site_folder(site: Site, folder: Path | None = None) -> Path:

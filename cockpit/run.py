@@ -33,7 +33,8 @@ def run_demo(
     record: Path | None = None,
 ) -> None:
     """Simulated machines, one process each, and a backend, until interrupted."""
-    from cockpit.station import Options, Station
+    from cockpit.options import Options
+    from cockpit.station import Station
 
     site = load_site(site_name)
     endpoint = with_port(LOOPBACK)
@@ -79,7 +80,8 @@ def run_serve(
     record: Path | None = None,
 ) -> None:
     """The cockpit on live machines, until interrupted."""
-    from cockpit.station import Options, Station
+    from cockpit.options import Options
+    from cockpit.station import Station
 
     site = load_site(site_name)
     listen = listen or site.link.listen or (() if connect or site.link.connect else (LIVE,))

@@ -7,8 +7,6 @@ import gc
 import sys
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from backend.documents.site import site_document
@@ -28,25 +26,11 @@ from backend.shell.link.source import LinkSource
 from backend.shell.runner import Runner
 from backend.site.site import Site
 from cockpit.desk import LOOPBACK, Desk, image_loops, load_models, make_config
+from cockpit.options import Options
 from cockpit.recording import make_recorder, recording_sources
 from cockpit.resolutions import resolutions
 from cockpit.views.inputs import scene_site
 from cockpit.views.server import HEAD, View, start
-
-
-@dataclass(frozen=True)
-class Options:
-    """host, port: of the page; listen, connect: Zenoh endpoints; own: machines answered for;
-    recording: whether; record: in which folder, None for the site's own."""
-
-    host: str
-    port: int
-    listen: tuple[str, ...]
-    connect: tuple[str, ...]
-    own: tuple[str, ...]
-    mode: str
-    record: Path | None = None
-    recording: bool = True
 
 
 class Station:

@@ -16,7 +16,7 @@ from backend.shell.session.cycles import Topics
 from backend.shell.session.evaluate import evaluate
 from backend.shell.session.reader import open_session
 from backend.site.site import load_site
-from cockpit.station import load_models, make_config
+from cockpit.desk import load_models, make_config
 
 ROOT = Path(__file__).resolve().parents[1]
 SESSIONS = ROOT / "scenes" / "sessions"

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from backend.shell.session.synthetic import Script, synthesize
 from backend.site.site import load_site
-from cockpit.station import load_models, make_config
+from cockpit.desk import load_models, make_config
 
 SESSIONS = Path(__file__).resolve().parents[1] / "scenes" / "sessions"
 

@@ -49,7 +49,7 @@ from backend.shell.session.keeper import Plan
 from backend.shell.session.recorder import ACTIONS, NoRecorder, Recorder
 from backend.shell.session.ring import Limits, parts_of
 from backend.site.site import Site, load_site
-from cockpit.station import load_models, make_config
+from cockpit.desk import load_models, make_config
 
 
 @pytest.fixture(scope="module")
