@@ -10,7 +10,6 @@ from rich.console import Console
 from rich.progress import Progress
 
 from backend.errors import InputError
-from backend.shell.session.convert import convert, needs_conversion
 from backend.site.site import load_site, shipped_sites
 
 
@@ -18,6 +17,11 @@ def as_session(path: Path, site_name: str | None) -> Path:
     """`path` itself, or for what only `cockpit convert` reads (rosbag2 with sqlite, CAN logs,
     tables of poses) the session made of it. Raises InputError, also where no site is named.
     """
+    if path.suffix == ".mcap" or any(path.glob("*.mcap")):
+        return path
+    # CAN and table libraries take a while to load, and most sessions need none of them.
+    from backend.shell.session.convert import convert, needs_conversion
+
     if not needs_conversion(path):
         return path
     if not site_name:
