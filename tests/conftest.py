@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 from chromium import ARGUMENTS, executable
+from hypothesis import settings
 from playwright.sync_api import Browser, sync_playwright
 from watched import watch
 
@@ -17,6 +18,10 @@ __all__ = ["watch"]
 
 ROOT = Path(__file__).resolve().parents[1]
 SHARED = ROOT.parent / "shared" / "data"
+
+# How long an example takes is no property of the code.
+settings.register_profile("cockpit", deadline=None)
+settings.load_profile("cockpit")
 
 # Before any program under test starts: none may record into the home of who runs the tests.
 RECORDINGS = tempfile.mkdtemp(prefix="cockpit-recordings-")

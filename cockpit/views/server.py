@@ -202,7 +202,12 @@ class View:
     def _draw_own(self, snapshot: Snapshot, now: float, lost: float) -> None:
         with self._lock:
             for browser in self._of(None):
-                browser.update(snapshot, self._source, self._scene.ground, now, lost)
+                try:
+                    browser.update(snapshot, self._source, self._scene.ground, now, lost)
+                except RuntimeError:
+                    # Its window was closed meanwhile, and viser has removed its nodes. Should the
+                    # window still be there after all, the next turn makes them anew.
+                    self._browsers.pop(browser.client.client_id, None)
 
     def _draw_own_now(self) -> None:
         """What was just chosen shows at once, without waiting for the next snapshot."""
