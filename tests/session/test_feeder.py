@@ -56,8 +56,8 @@ def dying_run(connection: Connection, plan: Plan) -> None:
     os._exit(1)
 
 
-# A test's computer may be busy: the campaign and the benchmark measure, tests see that nothing waits
-# for a disk that is stuck for seconds.
+# A computer that runs tests may be busy: campaign and benchmark measure, tests see that nothing
+# waits for a disk that is stuck for seconds.
 BUSY = 2.0  # [s]
 NEVER_WAITED = 0.4  # [s]
 
