@@ -77,10 +77,8 @@ def all_valid(snapshot: dict[str, Any]) -> bool:
     return all(m["validity"] == "VALID" for m in snapshot["machines"].values())
 
 
-@contextlib.contextmanager
-def backend(command: str, *arguments: str, endpoint: str | None = None) -> Iterator[Backend]:
-    """`cockpit COMMAND ...` on a free port, once it says where its page is."""
-    process = start(command, "--port", "0", "--no-browser", *arguments)
+def listen(process: subprocess.Popen[str], word: str) -> tuple[list[str], threading.Event]:
+    """The lines that a program prints, and an event: it printed `word`, or it ended."""
     output: list[str] = []
     ready = threading.Event()
 
@@ -88,11 +86,19 @@ def backend(command: str, *arguments: str, endpoint: str | None = None) -> Itera
         assert process.stdout is not None
         for line in process.stdout:
             output.append(line.rstrip())
-            if "tcp/" in line:
+            if word in line:
                 ready.set()
         ready.set()
 
     threading.Thread(target=read, daemon=True).start()
+    return output, ready
+
+
+@contextlib.contextmanager
+def backend(command: str, *arguments: str, endpoint: str | None = None) -> Iterator[Backend]:
+    """`cockpit COMMAND ...` on a free port, once it says where its page is."""
+    process = start(command, "--port", "0", "--no-browser", *arguments)
+    output, ready = listen(process, "tcp/")
     try:
         assert ready.wait(60.0), f"no start within 60 s: {output}"
         text = "\n".join(output)
@@ -144,18 +150,7 @@ def frames(socket: ClientConnection, seconds: float) -> Iterator[tuple[float, di
 def playback(path: Path, *options: str) -> Iterator[Backend]:
     """`cockpit play PATH`, once its page is up."""
     process = start("play", str(path), "--port", "0", "--no-browser", *options)
-    output: list[str] = []
-    ready = threading.Event()
-
-    def read() -> None:
-        assert process.stdout is not None
-        for line in process.stdout:
-            output.append(line.rstrip())
-            if "PLAYBACK" in line:
-                ready.set()
-        ready.set()
-
-    threading.Thread(target=read, daemon=True).start()
+    output, ready = listen(process, "PLAYBACK")
     try:
         assert ready.wait(90.0), output
         found = re.search(r"http://\S+:\d+", "\n".join(output))

@@ -132,7 +132,7 @@ def test_commands_reach_nobody(playing: Backend) -> None:
         subscriber = link.declare_subscriber(
             "**", lambda sample: heard.append(str(sample.key_expr))
         )
-        before = playing.get("/api/snapshot")["playback"]
+        before = order(playing, "pause", playing=False)["playback"]
         with connect(playing.url.replace("http", "ws") + "/ws", max_size=None) as socket:
             for message in (
                 {"type": "command", "machine": "left", "joints": {"swing": 1.0}},
