@@ -157,9 +157,14 @@ class Feed:
         self.page.on("pageerror", lambda error: self.errors.append(str(error)))
         self.page.on("console", lambda m: self.errors.append(m.text) if m.type == "error" else None)
         self.page.route("**/*", serve)
+        self.more_routes()
         self.page.route_web_socket("**/ws", self.accept)
         self.page.goto("http://page.test/")
         self.wait(lambda: self.socket is not None)
+
+    def more_routes(self) -> None:
+        """What else the server answers; stands before the page is opened, so that nothing it
+        asks for early is missed."""
 
     def accept(self, socket: WebSocketRoute) -> None:
         self.socket = socket

@@ -45,11 +45,13 @@ class PlaybackFeed(ExactFeed):
         self.player = Player(problems)
         super().__init__(browser, width, height)
 
-    def accept(self, socket: WebSocketRoute) -> None:
-        self.socket = socket
+    def more_routes(self) -> None:
         self.page.route("**/view/**", scene)
         self.page.route("**/api/session", self.player.answer)
         self.page.route("**/api/session/**", self.player.answer)
+
+    def accept(self, socket: WebSocketRoute) -> None:
+        self.socket = socket
         socket.on_message(self.hear)
         socket.send(site())
 
