@@ -211,7 +211,7 @@ class PlaybackStation:
         rate = self.images.timing["images"].timing().rate
         if rate > 0.0 and "resolution" not in document:
             document["resolution"] = resolutions(snapshot, self.config, 1.0 / rate)
-        for gone in ("demo", "recording"):
+        for gone in ("demo", "recording", "driving"):
             document.pop(gone, None)
         document["backend"] = self.backend()
         document["playback"] = self.player.status()

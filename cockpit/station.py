@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import gc
+import logging
 import sys
 import time
 from collections.abc import Callable
@@ -12,7 +13,7 @@ from typing import Any
 from backend.documents.site import site_document
 from backend.documents.snapshot import snapshot_document
 from backend.errors import InputError
-from backend.pipeline.records import Snapshot
+from backend.pipeline.records import Inputs, Snapshot
 from backend.shell.app.app import Sources, create_app
 from backend.shell.app.feed import Frames
 from backend.shell.app.server import WebServer, bind
@@ -26,11 +27,14 @@ from backend.shell.link.source import LinkSource
 from backend.shell.runner import Runner
 from backend.site.site import Site
 from cockpit.desk import LOOPBACK, Desk, image_loops, load_models, make_config
+from cockpit.driving import make_driving
 from cockpit.options import Options
 from cockpit.recording import make_recorder, recording_sources
 from cockpit.resolutions import resolutions
 from cockpit.views.inputs import scene_site
 from cockpit.views.server import HEAD, View, start
+
+log = logging.getLogger(__name__)
 
 
 class Station:
@@ -63,6 +67,7 @@ class Station:
         models = load_models(site)
         self.config = make_config(site, models, options.own, options.mode)
         self._demo_began = demo_began
+        self._driving_failure = ""
         self.hub = Hub()
         self.document = OncePerSnapshot(self._document)
         session = open_session(options.listen, options.connect, mode="router")
@@ -72,6 +77,8 @@ class Station:
         self._desk = Desk(self.config, self.hub, lambda: self.view, self.recorder.action)
         self.receiver = Receiver(session, prefixes, everything=self.recorder.wants_everything)
         self._closing.callback(self.receiver.close)
+        self.driving = make_driving(site, self.config, session, self.receiver, self._event)
+        self._closing.callback(self.driving.shut)
         self.runner = Runner(
             self.config,
             image_loops(site, self.config, self._closing),
@@ -80,7 +87,8 @@ class Station:
             site.rates.step_hz,
             self._desk.wishes,
             notices=self.recorder.notices,
-            after_cycle=self.recorder.after_cycle,
+            after_cycle=self._after_cycle,
+            driven=self.driving.driven,
         )
         frames = Frames(self.hub, self.document)
         relay = Relay(session, self.hub, self._texts, frames.images)
@@ -93,6 +101,7 @@ class Station:
             on_message=self._on_message,
             what_if=self._desk.what_if,
             recording=recording_sources(self.recorder, site, options),
+            seats=self.driving,
         )
         hooks = Hooks(opened=self.view.attach, closed=self.view.detach)
         loopback = options.host in LOOPBACK
@@ -127,6 +136,7 @@ class Station:
             document["resolution"] = resolutions(snapshot, self.config, 1.0 / rate)
         document["backend"] = self.backend()
         document["recording"] = vars(self.recorder.state())
+        document["driving"] = self.driving.document()
         if self._demo_began is not None:
             document["demo"] = {"elapsed": time.time() - self._demo_began()}
         return document
@@ -144,8 +154,22 @@ class Station:
         return {
             "step": vars(self.runner.step_timing.timing()),
             **{name: vars(watch.timing()) for name, watch in self.runner.image_timing.items()},
-            "failure": self.runner.failure,
+            "failure": self.runner.failure or self._driving_failure,
         }
+
+    def _after_cycle(self, inputs: Inputs, snapshot: Snapshot) -> None:
+        if not self._driving_failure:
+            try:
+                self.driving.cycle(snapshot)  # first: a command must not wait for the recorder
+            except Exception as error:
+                # The view must outlive it; without commands every machine stands by itself.
+                self._driving_failure = f"driving stopped: {error!r}"
+                log.exception("%s", self._driving_failure)
+        self.recorder.after_cycle(inputs, snapshot)
+
+    def _event(self, what: str, who: str, details: dict[str, Any]) -> None:
+        """What an operator did with a machine, for the recording."""
+        self.recorder.action(what, None, {"who": who, **details})
 
     def _on_message(self, message: dict[str, Any]) -> None:
         """What a page asks of the recording, or of the scene and the images."""

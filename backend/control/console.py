@@ -14,8 +14,9 @@ import math
 from dataclasses import dataclass, replace
 from enum import Enum
 
-PRESENT = 0.1
-"""Input of the operator's that is older than this counts as let go [s]."""
+PRESENT = 0.2
+"""Input of the operator's that is older than this counts as let go [s]: a zero command leaves
+within a quarter of a second of the last input. What is let go by hand is told at once."""
 
 
 class State(Enum):

@@ -51,18 +51,20 @@ def approach_of(
 
 
 def unknown_ages(
-    machines: Mapping[str, MachineState], now: float, config: Config
+    driven: frozenset[str], machines: Mapping[str, MachineState], now: float, config: Config
 ) -> Iterable[Concern]:
-    """One concern for every own machine while the age of its data or a partner's is not known.
+    """One concern for every driven machine while the age of its data or a partner's is not known.
 
     Ages that count from arrival leave out the way, and braking distances would be too short.
     """
+    if not driven:
+        return
     silent = [
         name
         for name, state in machines.items()
         if state.body is not None and state.pose.streams["joints"].age_source != "offset"
     ]
-    for own in config.own if silent else ():
+    for own in (name for name in config.own if silent and name in driven):
         label = config.labels[own if own in silent else silent[0]]
         n = len(config.machines[own].joints)
         nothing = Evidence(own, "", float("nan"), None, float("inf"))

@@ -16,8 +16,7 @@ class Config:
 
     eta: configured inflation [m]; far: beyond this gap of two machines' workspaces no exact
     distance is computed [m]; site: what stands on the site; stop_latency: from asking a machine to
-    stop to its first braking [s]; margins: whether joints' margins are computed; drive: whether
-    somebody may drive, so that braking distances are judged.
+    stop to its first braking [s]; margins: whether joints' margins are computed.
     """
 
     frame: SiteFrame
@@ -31,4 +30,3 @@ class Config:
     site: SiteBodies = NO_SITE_BODIES
     stop_latency: float = 0.3
     margins: bool = True
-    drive: bool = False

@@ -47,6 +47,7 @@ class Inputs:
     foreign: tuple[tuple[str, int], ...] = ()  # key prefix, messages of machines not of this site
     lost: int = 0  # messages dropped because the queue was full
     notices: tuple[Notice, ...] = ()  # those that hold now
+    driven: tuple[str, ...] = ()  # machines that somebody here controls: their brakes are judged
 
 
 @dataclass(frozen=True)

@@ -64,9 +64,11 @@ def step(state: State, inputs: Inputs, now: float, config: Config) -> tuple[Stat
         if config.margins
         else {}
     )
-    concerns = tuple(_partner(name, machines, close, unknown, now, config) for name in config.own)
-    if config.drive:
-        concerns += tuple(unknown_ages(machines, now, config))
+    driven = frozenset(inputs.driven)
+    concerns = tuple(
+        _partner(name, machines, close, unknown, now, config, name in driven) for name in config.own
+    )
+    concerns += tuple(unknown_ages(driven, machines, now, config))
     raised = alarms.update(state.alarms, concerns, now)
     health = _health(state.health, inputs, strangers)
     notices = _notices(state.notices, inputs.notices, now)
@@ -129,11 +131,12 @@ def _partner(
     unknown: dict[str, str],
     now: float,
     config: Config,
+    driven: bool,
 ) -> Concern:
     joints = len(config.machines[name].joints)
     if name in unknown:
         return partner.unknown(name, joints, unknown[name], now)
-    braking = approach_of(name, machines, now, config) if config.drive else None
+    braking = approach_of(name, machines, now, config) if driven else None
     return partner.judge(name, joints, tuple(close[name]), config.limits, now, braking)
 
 

@@ -8,6 +8,7 @@ and their sources.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -151,6 +152,8 @@ def limit(
 def _locked(delay: Delay) -> str:
     if delay.round_trip <= LOCKED_ABOVE:
         return ""
+    if not math.isfinite(delay.round_trip):
+        return "round trip is unknown: motion is locked"
     return (
         f"round trip {1e3 * delay.round_trip:.0f} ms: "
         f"motion is locked above {1e3 * LOCKED_ABOVE:.0f} ms"

@@ -35,7 +35,8 @@ class Runner:
 
     loops: what images are made, and how often; wishes: what operators chose, asked each time;
     notices: what operators should know about the cockpit itself, asked each cycle; after_cycle:
-    told a cycle's inputs and conclusions once every view has them. Both must be quick.
+    told a cycle's inputs and conclusions once every view has them; driven: which machines somebody
+    controls from here. All must be quick.
     """
 
     def __init__(
@@ -49,6 +50,7 @@ class Runner:
         clock: Callable[[], float] = time.monotonic,
         notices: Callable[[], tuple[Notice, ...]] = lambda: (),
         after_cycle: Callable[[Inputs, Snapshot], None] = lambda inputs, snapshot: None,
+        driven: Callable[[], tuple[str, ...]] = lambda: (),
     ) -> None:
         self.config = config
         self.hub = hub
@@ -58,6 +60,7 @@ class Runner:
         self._clock = clock
         self._notices = notices
         self._after_cycle = after_cycle
+        self._driven = driven
         self._done: deque[ImageStamp] = deque(maxlen=100)
         self._images = ImageLoops(hub, loops, wishes, self._done.append, clock)
         self.image_timing = self._images.timing
@@ -94,9 +97,10 @@ class Runner:
             start = self._clock()
             inputs = self._source.take()
             finished = tuple(self._done.popleft() for _ in range(len(self._done)))
-            notices = self._notices()
-            if finished or notices:
-                inputs = replace(inputs, images=inputs.images + finished, notices=notices)
+            notices, driven = self._notices(), self._driven()
+            if finished or notices or driven:
+                images = inputs.images + finished
+                inputs = replace(inputs, images=images, notices=notices, driven=driven)
             state, snapshot = step(state, inputs, start, self.config)
             self.step_timing.add(start, self._clock())
             self.hub.publish(snapshot)

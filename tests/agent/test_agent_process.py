@@ -18,8 +18,8 @@ from backend.machine.load import load_machine
 from backend.shell.agent.drivers.simulation import SimDriver
 from backend.shell.agent.gate import names_of
 from backend.shell.agent.process import run, run_agent
-from backend.shell.agent.wire import decode_answer, encode_request
 from backend.shell.link.encode import encode_command, encode_limits
+from backend.shell.link.lease_codec import decode_answer, encode_request
 from backend.shell.link.messages import Command, MotionLimits
 from backend.shell.link.receiver import Receiver
 from backend.shell.link.session import open_session, publisher, with_port

@@ -65,7 +65,7 @@ def test_silence_of_the_operators_device_stops() -> None:
     t = ACTIVE.since
     late = advance(ACTIVE, replace(MOVED, time=t), t + PRESENT + 1e-6)
     assert late.state is State.PAUSE
-    assert PRESENT <= 0.1
+    assert PRESENT <= 0.2  # with a cycle more, a zero command leaves within 250 ms
 
 
 def test_a_time_from_the_future_counts_as_no_input() -> None:

@@ -8,53 +8,15 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-import msgspec
-
-from backend.control.lease import Answer, Kind, Lease, Request
+from backend.control.lease import Lease
 from backend.machine.model import Machine
 from backend.shell.agent.gate import Gate, hear, hear_limits, negotiate
 from backend.shell.link.codec import DecodeError, decode, decode_limits
+from backend.shell.link.lease_codec import decode_request, encode_answer
 from backend.shell.link.messages import Command
 from backend.shell.link.topics import key, topic
 
 QUEUE = 64
-
-
-class _Asked(msgspec.Struct, forbid_unknown_fields=True):
-    kind: Kind
-    who: str
-    role: str = "operator"
-    token: int = 0
-    to: str = ""
-    reason: str = ""
-
-
-def encode_request(request: Request) -> bytes:
-    """JSON, as the lease's queryable takes it."""
-    return msgspec.json.encode(request)
-
-
-def decode_request(payload: bytes) -> Request:
-    """Raises DecodeError for anything that is no request."""
-    if len(payload) > topic("lease").max_bytes:
-        raise DecodeError(f"lease: {len(payload)} bytes")
-    try:
-        asked = msgspec.json.decode(payload, type=_Asked)
-    except (msgspec.DecodeError, UnicodeDecodeError) as error:
-        raise DecodeError(f"lease: {error}") from error
-    return Request(asked.kind, asked.who, asked.role, asked.token, asked.to, asked.reason)
-
-
-def encode_answer(answer: Answer) -> bytes:
-    return msgspec.json.encode(answer)
-
-
-def decode_answer(payload: bytes) -> Answer:
-    """Raises DecodeError for anything that is no answer."""
-    try:
-        return msgspec.json.decode(payload, type=Answer)
-    except (msgspec.DecodeError, UnicodeDecodeError) as error:
-        raise DecodeError(f"lease: {error}") from error
 
 
 class Ear:

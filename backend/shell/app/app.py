@@ -15,10 +15,11 @@ from fastapi_offline import FastAPIOffline
 from starlette.middleware.base import RequestResponseEndpoint
 from starlette.middleware.trustedhost import TrustedHostMiddleware
 
+from backend.control.person import SUPERVISOR, Person
 from backend.errors import InputError
 from backend.fusion.pose import Validity
 from backend.pipeline.records import Snapshot
-from backend.shell.app.feed import Feed, Frames
+from backend.shell.app.feed import Feed, Frames, Seats
 from backend.shell.app.models import (
     HealthModel,
     MachineDescriptionModel,
@@ -39,13 +40,18 @@ PAGE_POLICY = (
 )
 
 
+LOCAL = Person("local", SUPERVISOR)
+"""Whoever opens the page where nobody signs in."""
+
+
 @dataclass(frozen=True)
 class Sources:
     """What the app reads. site: its document; frames: snapshots and images, encoded once.
 
     backend: live timings; on_message: what a page asks of the views (camera, own machine);
     what_if: judges a posture, called with a machine and joint values by role, in a worker thread;
-    raises InputError for what it does not know; recording: None where nothing is ever recorded.
+    raises InputError for what it does not know; recording: None where nothing is ever recorded;
+    seats: None where nobody can drive.
     """
 
     site: dict[str, Any]
@@ -54,6 +60,7 @@ class Sources:
     on_message: Callable[[dict[str, Any]], None]
     what_if: Callable[[str, dict[str, float]], dict[str, Any]]
     recording: RecordingSources | None = None
+    seats: Seats | None = None
 
 
 def create_app(
@@ -77,7 +84,7 @@ def create_app(
         redoc_url=None,
     )
     app.add_middleware(TrustedHostMiddleware, allowed_hosts=list(hosts))
-    feed = Feed(sources.frames, sources.site, sources.on_message)
+    feed = Feed(sources.frames, sources.site, sources.on_message, sources.seats)
     hub = sources.frames.hub
 
     @app.middleware("http")
@@ -140,7 +147,7 @@ def create_app(
             await websocket.close(code=1008)
             return
         await websocket.accept()
-        await feed.serve(websocket)
+        await feed.serve(websocket, getattr(websocket.state, "person", LOCAL))
 
     if sources.recording is not None:
         app.include_router(recording_router(sources.recording))

@@ -10,10 +10,11 @@ import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Protocol
 
 from fastapi import WebSocket, WebSocketDisconnect
 
+from backend.control.person import Person
 from backend.pipeline.records import Snapshot
 from backend.shell.app.image_frames import frame_of
 from backend.shell.app.wire import encode
@@ -82,6 +83,16 @@ class Flow:
         return len(self._in_flight) < IN_FLIGHT
 
 
+class Seats(Protocol):
+    """Where operators sit. open: a seat's name for a person; on_message: whether it was theirs."""
+
+    def open(self, person: Person) -> str: ...
+
+    def on_message(self, name: str, message: dict[str, Any]) -> bool: ...
+
+    def close(self, name: str) -> None: ...
+
+
 class Feed:
     """Serves one accepted websocket until it closes."""
 
@@ -90,14 +101,38 @@ class Feed:
         frames: Frames,
         site: dict[str, Any],
         on_message: Callable[[dict[str, Any]], None],
+        seats: Seats | None = None,
     ) -> None:
         self._hub = frames.hub
         self._frames = frames
         self._site = encode({"type": "site", **site})
         self._on_message = on_message
+        self._seats = seats
         self.clients = 0
 
-    async def serve(self, socket: WebSocket) -> None:
+    async def serve(self, socket: WebSocket, person: Person | None = None) -> None:
+        """person: who opened the page; without one, and without seats, it only looks."""
+        if self._seats is None or person is None:
+            await self._serve(socket, self._on_message)
+            return
+        seats, seat = self._seats, self._seats.open(person)
+        you = {"type": "you", "seat": seat, "who": person.who, "role": person.role}
+
+        def on_message(message: dict[str, Any]) -> None:
+            if not seats.on_message(seat, message):
+                self._on_message(message)
+
+        try:
+            await self._serve(socket, on_message, encode(you))
+        finally:
+            seats.close(seat)
+
+    async def _serve(
+        self,
+        socket: WebSocket,
+        on_message: Callable[[dict[str, Any]], None],
+        greeting: bytes = b"",
+    ) -> None:
         self.clients += 1
         fresh = asyncio.Event()
         loop = asyncio.get_running_loop()
@@ -108,8 +143,8 @@ class Feed:
 
         stop_listening = self._hub.listen(notify)
         flow = Flow()
-        sender = asyncio.create_task(self._send(socket, fresh, flow))
-        receiver = asyncio.create_task(self._receive(socket, flow))
+        sender = asyncio.create_task(self._send(socket, fresh, flow, greeting))
+        receiver = asyncio.create_task(self._receive(socket, flow, on_message))
         try:
             done, _ = await asyncio.wait({sender, receiver}, return_when=asyncio.FIRST_COMPLETED)
             for task in done:
@@ -125,8 +160,12 @@ class Feed:
             await asyncio.gather(sender, receiver, return_exceptions=True)
             self.clients -= 1
 
-    async def _send(self, socket: WebSocket, fresh: asyncio.Event, flow: Flow) -> None:
+    async def _send(
+        self, socket: WebSocket, fresh: asyncio.Event, flow: Flow, greeting: bytes
+    ) -> None:
         await socket.send_bytes(self._site)
+        if greeting:
+            await socket.send_bytes(greeting)
         sent_cycle = -1
         sent_images: dict[tuple[str, str], float] = {}
         while True:
@@ -150,7 +189,9 @@ class Feed:
             # What arrives meanwhile waits for the next turn: the newest wins, nothing queues.
             await asyncio.sleep(max(0.0, SNAPSHOT_PERIOD - (time.monotonic() - started)))
 
-    async def _receive(self, socket: WebSocket, flow: Flow) -> None:
+    async def _receive(
+        self, socket: WebSocket, flow: Flow, on_message: Callable[[dict[str, Any]], None]
+    ) -> None:
         while True:
             text = await socket.receive_text()
             if len(text) > MAX_MESSAGE:
@@ -162,4 +203,4 @@ class Feed:
                 if message.get("type") == "ack" and isinstance(message.get("cycle"), int):
                     flow.acknowledge(message["cycle"])
                 else:
-                    self._on_message(message)
+                    on_message(message)

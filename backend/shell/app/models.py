@@ -6,6 +6,8 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from backend.shell.app.driving_models import DrivingModel
+
 Vector = list[float]
 Unknown = float | None
 """A number, or null where the value does not exist or is unknown."""
@@ -183,6 +185,7 @@ class SnapshotModel(BaseModel):
         default_factory=dict, description="Sun 2020, Section 5.1, live"
     )
     recording: RecordingStateModel | None = Field(None, description="of this backend")
+    driving: DrivingModel | None = Field(None, description="not in playback")
     demo: DemoModel | None = Field(None, description="only in the demo")
     playback: PlaybackModel | None = Field(None, description="only in playback")
 

@@ -44,7 +44,7 @@ def _bytes(message: Any) -> bytes:
 
 
 def _vector(values: Sequence[float] | Array) -> Any:
-    return np.asarray(values, dtype=np.float64)
+    return np.ascontiguousarray(values, dtype=np.float64)
 
 
 def encode_clock(time: float) -> bytes:

@@ -231,6 +231,7 @@ def _inputs(heard: tuple[Sample, ...], cycle: dict[str, Any]) -> Inputs:
         foreign=tuple((str(key), int(n)) for key, n in cycle.get("foreign", ())),
         lost=int(cycle.get("lost", 0)),
         notices=tuple(Notice(**notice) for notice in cycle.get("notices", ())),
+        driven=tuple(str(name) for name in cycle.get("driven", ())),
     )
 
 

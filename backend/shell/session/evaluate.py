@@ -52,9 +52,9 @@ def merged(inputs: Iterable[Inputs]) -> Inputs:
     joined = {
         field.name: sum((getattr(one, field.name) for one in several), start=())
         for field in fields(Inputs)
-        if field.name not in ("lost", "notices")
+        if field.name not in ("lost", "notices", "driven")
     }
-    # Notices are not events: those of the last cycle hold.
+    # Notices, and who is driven, are not events: those of the last cycle hold.
     return replace(several[-1], **joined, lost=sum(one.lost for one in several))
 
 

@@ -59,6 +59,7 @@ SCHEMAS: dict[str, dict[str, Any]] = {
             "foreign": _COUNTS,
             "lost": _COUNT,
             "notices": {"type": "array", "items": {"type": "object"}},
+            "driven": {"type": "array", "items": {"type": "string"}},
         },
     ),
     # one round trip to a machine's clock: local, remote, local [s]

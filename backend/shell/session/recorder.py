@@ -227,6 +227,8 @@ def _cycle_text(inputs: Inputs, snapshot: Snapshot) -> bytes:
         document["foreign"] = inputs.foreign
     if inputs.lost:
         document["lost"] = inputs.lost
+    if inputs.driven:
+        document["driven"] = list(inputs.driven)
     if inputs.notices:
         document["notices"] = [{"key": n.key, "line": n.line} for n in inputs.notices]
     return msgspec.json.encode(document)  # numbers come back bit by bit, and it is quick

@@ -123,7 +123,6 @@ def drive(plan: Drive, hands: Sequence[Hands] | None = None) -> Outcome:
         eta=site.safety.eta,
         mode="DEMO",
         margins=False,
-        drive=plan.limited,
     )
     radios = Radio(site.sim.radio_period, plan.down), Radio(site.sim.radio_period, plan.up)
     sticks = hands or [Careless(np.random.default_rng((plan.seed, k))) for k in range(2)]
@@ -145,7 +144,8 @@ def drive(plan: Drive, hands: Sequence[Hands] | None = None) -> Outcome:
             cycle_due += CYCLE
             snapshot = None
             if plan.limited:
-                pipeline, snapshot = step(pipeline, Inputs(tuple(samples)), t, config)
+                inputs = Inputs(tuple(samples), driven=NAMES)
+                pipeline, snapshot = step(pipeline, inputs, t, config)
                 samples = []
             for one, stick in zip(fleet, sticks, strict=True):
                 _command(one, stick.at(t), snapshot, t, radios[1], plan, rng, outcome)

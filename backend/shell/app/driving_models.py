@@ -1,0 +1,73 @@
+"""The driving part of a snapshot document, described field by field with units."""
+
+from __future__ import annotations
+
+from pydantic import BaseModel, Field
+
+PAIR = "negative and positive direction"
+
+
+class DrivenMachineModel(BaseModel):
+    """Who is in control of one machine, as its own agent reports."""
+
+    agent: bool = Field(description="whether its agent reports")
+    mode: str | None = Field(description="remote, stopped, hold, program or rejoining")
+    holder: str = Field(description="of the lease, empty for nobody")
+    offered_to: str = Field(description="whom this cockpit's holder is handing it to")
+    round_trip: float | None = Field(description="longest of the last 2 s, there and back [s]")
+    level: str = Field(description="of the round trip: ok, slow, bad, locked or unknown")
+    locked: str = Field(description="why nothing may move, in words, else empty")
+
+
+class SticksModel(BaseModel):
+    """Deflections in -1..1: x to the right, y forwards."""
+
+    left_x: float
+    left_y: float
+    right_x: float
+    right_y: float
+    track_left: float
+    track_right: float
+
+
+class ConsoleModel(BaseModel):
+    state: str = Field(description="Reserved, Idle, Enabled, Active, Pause, Override or Stop")
+    why: str = Field(description="of a pause or stop, in words")
+    since: float | None = Field(description="local monotonic clock [s]")
+    held: bool = Field(description="whether this seat holds the machine's lease")
+    refused: str = Field(description="what the last request was refused with, else empty")
+
+
+class CauseModel(BaseModel):
+    concern: str = Field(description="partner, end, neutral, link, ...; empty where free")
+    reason: str
+
+
+class DecisionModel(BaseModel):
+    """What the limiter made of the sticks. Motions: joints by role, track_left, track_right."""
+
+    locked: str = Field(description="why nothing moves at all, else empty")
+    fraction: dict[str, list[float]] = Field(description=f"of full speed, {PAIR}, 0..1")
+    causes: dict[str, list[CauseModel]] = Field(description=f"why less than full, {PAIR}")
+    cut: dict[str, str] = Field(description="why the command is less than that")
+    command: dict[str, float] = Field(description="sent [rad/s]; tracks [m/s]")
+
+
+class SeatModel(BaseModel):
+    """One page in front of which somebody sits."""
+
+    who: str
+    role: str = Field(description="viewer, operator or supervisor")
+    driven: str = Field(description="the machine that the sticks belong to")
+    pattern: str = Field(description="ISO or SAE")
+    fine: bool
+    override: str = Field(description="reason of an override, while it may be held")
+    source: str = Field(description="gamepad, keyboard, screen or empty")
+    sticks: SticksModel
+    consoles: dict[str, ConsoleModel] = Field(description="by machine")
+    decision: dict[str, DecisionModel] = Field(description="by machine that is held")
+
+
+class DrivingModel(BaseModel):
+    machines: dict[str, DrivenMachineModel]
+    seats: dict[str, SeatModel] = Field(description="by the name that a page is told")

@@ -1,0 +1,88 @@
+"""What pages are told of driving: who holds which machine, what each seat does, what limits it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from backend.control.latency import Condition
+from backend.control.seat import Seat
+from backend.machine.model import Machine
+from backend.safety.limiter import Decision
+from backend.shell.driving.leases import Held
+from backend.shell.driving.outlet import TRACKS
+from backend.shell.link.messages import AgentStatus
+
+SILENT = 1.0
+"""A machine whose agent has not reported for this long has none, as far as is known [s]."""
+
+
+def machine_document(
+    status: AgentStatus | None, held: Held | None, condition: Condition | None, now: float
+) -> dict[str, Any]:
+    """condition: of the way to the machine, None where no command is sent; now [s]."""
+    present = status is not None and now - status.arrival <= SILENT
+    known = condition is not None and condition.known
+    return {
+        "agent": present,
+        "mode": status.mode if present and status else None,
+        "holder": status.holder if present and status else "",
+        "offered_to": held.offered_to if held else "",
+        "round_trip": condition.round_trip if known and condition else None,
+        "level": condition.level if condition else "unknown",
+        "locked": condition.locked if condition else "",
+    }
+
+
+def seat_document(
+    name: str,
+    seat: Seat,
+    held: Mapping[str, Held],
+    refused: Mapping[str, str],
+    decisions: Mapping[str, Decision],
+    machines: Mapping[str, Machine],
+) -> dict[str, Any]:
+    """name: of the seat; refused: by machine, what its last request was answered with."""
+    mine = [machine for machine, lease in held.items() if lease.seat == name]
+    return {
+        "who": seat.person.who,
+        "role": seat.person.role,
+        "driven": seat.desk.driven,
+        "pattern": seat.setting.pattern.value,
+        "fine": seat.setting.fine,
+        "override": seat.reason,
+        "source": seat.input.source,
+        "sticks": vars(seat.input.sticks),
+        "consoles": {
+            machine: {
+                "state": console.state.value,
+                "why": console.why,
+                "since": console.since if math.isfinite(console.since) else None,
+                "held": machine in mine,
+                "refused": refused.get(machine, ""),
+            }
+            for machine, console in seat.desk.consoles.items()
+        },
+        "decision": {
+            machine: decision_document(decisions[machine], machines[machine])
+            for machine in mine
+            if machine in decisions
+        },
+    }
+
+
+def decision_document(decision: Decision, machine: Machine) -> dict[str, Any]:
+    """By motion: joints by role, then the tracks; pairs are (negative, positive)."""
+    motions = (*(joint.role for joint in machine.joints), *TRACKS)
+    command = [*decision.joints.tolist(), *decision.tracks.tolist()]
+    return {
+        "locked": decision.locked,
+        "fraction": dict(zip(motions, decision.fraction.tolist(), strict=True)),
+        "causes": {
+            motion: [vars(cause) for cause in pair]
+            for motion, pair in zip(motions, decision.causes, strict=True)
+        },
+        "cut": {motions[k]: cause.reason for k, cause in decision.cut.items()},
+        "command": dict(zip(motions, command, strict=True)),
+    }
