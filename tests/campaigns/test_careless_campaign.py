@@ -51,7 +51,10 @@ def tally(count: int, compare: bool = True, **plan: float) -> Tally:
     found = Tally()
     for seed in range(count):
         one = Drive(seed, MODELS[seed % len(MODELS)], **plan)  # type: ignore[arg-type]
-        found.add(one, drive(twin(one)) if compare else None, drive(one))
+        free, limited = drive(twin(one)) if compare else None, drive(one)
+        found.add(one, free, limited)
+        alone = "not driven" if free is None else f"contact {free.contact}"
+        print(f"  drive {seed}: contact {limited.contact}; unlimited: {alone}", flush=True)
     return found
 
 
