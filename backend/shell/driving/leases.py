@@ -50,6 +50,7 @@ class Leases:
         self._lock = threading.Lock()
         self._seats: set[str] = set()
         self._held: dict[str, Held] = {}
+        self._newest: dict[str, int] = {}  # token ever granted to a seat of this cockpit
         self._refused: dict[tuple[str, str], str] = {}
 
     def open(self, seat: str) -> None:
@@ -146,7 +147,9 @@ class Leases:
     ) -> None:
         held = self._held.get(machine)
         if request.kind in (Kind.REQUEST, Kind.TAKE_OVER):
-            if held is None or answer.token > held.token:
+            # An answer that was overtaken on the way grants nothing any more.
+            if answer.token > self._newest.get(machine, 0):
+                self._newest[machine] = answer.token
                 until = asked + min(answer.expires_in, TERM)
                 self._held[machine] = Held(seat, request.who, answer.token, asked, until)
         elif request.kind is Kind.HAND_OVER and held is not None:
