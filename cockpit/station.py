@@ -113,6 +113,7 @@ class Station:
         self.web = WebServer(app, listener)
         self.recorder.start()
         self._closing.callback(self.recorder.close)
+        self.driving.start()
         self.runner.start()
         self._closing.callback(self.runner.stop)
         relay.start()

@@ -110,8 +110,8 @@ def backend(command: str, *arguments: str, endpoint: str | None = None) -> Itera
 
 
 @contextlib.contextmanager
-def serve(site: str, *arguments: str) -> Iterator[Backend]:
-    endpoint = with_port("tcp/127.0.0.1:0")
+def serve(site: str, *arguments: str, endpoint: str | None = None) -> Iterator[Backend]:
+    endpoint = endpoint or with_port("tcp/127.0.0.1:0")
     with backend("serve", "--site", site, "--listen", endpoint, *arguments) as running:
         running.endpoint = endpoint
         yield running

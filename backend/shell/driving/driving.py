@@ -26,12 +26,15 @@ from backend.safety.limiter import Decision, Latch, limit, open_latch
 from backend.safety.limits import Delay
 from backend.shell.driving import pages
 from backend.shell.driving.document import machine_document, seat_document
-from backend.shell.driving.leases import Held, Leases
+from backend.shell.driving.leases import REFRESH, Held, Leases
 from backend.shell.driving.outlet import Outlet
 from backend.shell.link.messages import AgentStatus
 
 MOST_UP = 1.0
 """What is looked ahead for a way of unknown length [s]; nothing moves then anyway."""
+
+LATE = 0.4
+"""A cycle that comes later than this after the last pauses whatever moves: it stood already [s]."""
 
 Event = Callable[[str, str, dict[str, Any]], None]
 """Told what happened ("lease", "console", "stop", ...), who did it, and details."""
@@ -72,6 +75,13 @@ class Driving:
         self._fencing: dict[str, _Fencing] = {}
         self._stopped: dict[str, str] = {}  # machines that nobody has reset since, and why
         self._opened = 0
+        self._cycled = clock()
+        self._stopping = threading.Event()
+        self._refresher = threading.Thread(target=self._refresh, name="leases", daemon=True)
+
+    def start(self) -> None:
+        """Leases are refreshed from now on, however busy the fast loop is."""
+        self._refresher.start()
 
     def open(self, person: Person) -> str:
         """Somebody sits down; the name of their seat."""
@@ -112,7 +122,6 @@ class Driving:
 
     def cycle(self, snapshot: Snapshot) -> None:
         """Sends what the newest snapshot allows of what the operators wish."""
-        self._leases.refresh()
         for name, status in self._statuses().items():
             if name in self._outlets:
                 self._outlets[name].hear(status)
@@ -120,7 +129,9 @@ class Driving:
         told: list[tuple[str, dict[str, Any]]] = []
         with self._lock:
             now = self._clock()  # not the snapshot's time: input that came since is none of later
-            networks = {name: self._outlets[name].condition(now).known for name in held}
+            on_time = now - self._cycled <= LATE
+            self._cycled = now
+            networks = {name: on_time and self._outlets[name].condition(now).known for name in held}
             for name, seat in self._seats.items():
                 mine = {machine: lease.seat == name for machine, lease in held.items()}
                 after = seats.advance(seat, mine, networks, now)
@@ -140,6 +151,9 @@ class Driving:
 
     def shut(self) -> None:
         """Gives every lease back and sends nothing more."""
+        self._stopping.set()
+        if self._refresher.is_alive():
+            self._refresher.join(timeout=1.0)
         with self._lock:
             names = list(self._seats)
         for name in names:
@@ -199,6 +213,10 @@ class Driving:
         self._fencing[name] = _Fencing(lease.token, decision.latch)
         outlet.send(decision, lease.who, lease.token)
         return decision
+
+    def _refresh(self) -> None:
+        while not self._stopping.wait(REFRESH / 3.0):
+            self._leases.refresh()
 
     def _stop(self, by: Seat) -> None:
         """Latches every seat that holds a machine: whoever sees danger stops what moves."""
