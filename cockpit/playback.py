@@ -17,6 +17,7 @@ from typing import Any
 from rich.console import Console
 from rich.progress import Progress
 
+from backend.control.person import Person
 from backend.documents.site import site_document
 from backend.documents.snapshot import snapshot_document
 from backend.errors import InputError
@@ -253,10 +254,11 @@ class PlaybackStation:
         """The report ("report") or an export of the session. Raises InputError."""
         return session_file(self.seen.session.path, self.seen.chosen_site, kind)
 
-    def _on_message(self, message: dict[str, Any]) -> None:
+    def _on_message(self, message: dict[str, Any], person: Person | None) -> None:
         """What a page asks of playback or of the scene. Anything else, commands included, ends
         here: there is nobody whom it could reach.
         """
+        del person
         if message.get("type") == "playback":
             with contextlib.suppress(InputError):
                 self.player.do(message.get("do"), message.get("value"))

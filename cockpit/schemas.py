@@ -6,6 +6,7 @@ import json
 
 from pydantic import BaseModel
 
+from backend.documents.alarms import AlarmsDocument
 from backend.documents.assessment import AssessmentDocument
 from backend.documents.bench import BenchDocument
 from backend.documents.conversion import ConversionDocument, ExportDocument
@@ -34,6 +35,7 @@ SCHEMAS: dict[str, tuple[type[BaseModel], str]] = {
     "session": (SessionDocument, "/api/session"),
     "series": (SeriesDocument, "/api/session/series"),
     "diff": (DiffDocument, "what diff --json prints, and /api/session/diff"),
+    "alarms": (AlarmsDocument, "/api/alarms; its entries are the lines of alarms.jsonl"),
     "site-file": (SiteTable, "a site file, as TOML"),
 }
 

@@ -10,10 +10,12 @@ import time
 from collections.abc import Callable
 from typing import Any
 
+from backend.control.person import Person
 from backend.documents.site import site_document
 from backend.documents.snapshot import snapshot_document
 from backend.errors import InputError
-from backend.pipeline.records import Inputs, Snapshot
+from backend.pipeline.records import Inputs, Notice, Snapshot
+from backend.shell.alarm_log import AlarmLog
 from backend.shell.app.app import Sources, create_app
 from backend.shell.app.feed import Frames
 from backend.shell.app.server import WebServer, bind
@@ -25,11 +27,12 @@ from backend.shell.link.relay import Relay
 from backend.shell.link.session import open_session
 from backend.shell.link.source import LinkSource
 from backend.shell.runner import Runner
+from backend.shell.session.recorder import Recorder
 from backend.site.site import Site
 from cockpit.desk import LOOPBACK, Desk, image_loops, load_models, make_config
 from cockpit.driving import make_driving
 from cockpit.options import Options
-from cockpit.recording import make_recorder, recording_sources
+from cockpit.recording import make_recorder, recording_sources, site_folder
 from cockpit.resolutions import resolutions
 from cockpit.views.inputs import scene_site
 from cockpit.views.server import HEAD, View, start
@@ -74,6 +77,10 @@ class Station:
         self._closing.callback(session.close)
         prefixes = {machine.prefix: machine.name for machine in site.machines}
         self.recorder = make_recorder(site, self.config, options)
+        kept = site_folder(site, options.record) / "alarms.jsonl"
+        recording = isinstance(self.recorder, Recorder)
+        self.alarm_log = AlarmLog(kept if recording else None, self.config.labels)
+        self._closing.callback(self.alarm_log.close)
         self._desk = Desk(self.config, self.hub, lambda: self.view, self.recorder.action)
         self.receiver = Receiver(session, prefixes, everything=self.recorder.wants_everything)
         self._closing.callback(self.receiver.close)
@@ -86,7 +93,7 @@ class Station:
             self.hub,
             site.rates.step_hz,
             self._desk.wishes,
-            notices=self.recorder.notices,
+            notices=self._notices,
             after_cycle=self._after_cycle,
             driven=self.driving.driven,
         )
@@ -102,6 +109,7 @@ class Station:
             what_if=self._desk.what_if,
             recording=recording_sources(self.recorder, site, options),
             seats=self.driving,
+            alarms=self.alarm_log.document,
         )
         hooks = Hooks(opened=self.view.attach, closed=self.view.detach)
         loopback = options.host in LOOPBACK
@@ -112,6 +120,7 @@ class Station:
         )
         self.web = WebServer(app, listener)
         self.recorder.start()
+        self.alarm_log.start()
         self._closing.callback(self.recorder.close)
         self.driving.start()
         self.runner.start()
@@ -166,16 +175,24 @@ class Station:
                 # The view must outlive it; without commands every machine stands by itself.
                 self._driving_failure = f"driving stopped: {error!r}"
                 log.exception("%s", self._driving_failure)
+        self.alarm_log.after_cycle(snapshot)
         self.recorder.after_cycle(inputs, snapshot)
+
+    def _notices(self) -> tuple[Notice, ...]:
+        return self.recorder.notices() + self.alarm_log.notices()
 
     def _event(self, what: str, who: str, details: dict[str, Any]) -> None:
         """What an operator did with a machine, for the recording."""
         self.recorder.action(what, None, {"who": who, **details})
 
-    def _on_message(self, message: dict[str, Any]) -> None:
-        """What a page asks of the recording, or of the scene and the images."""
+    def _on_message(self, message: dict[str, Any], person: Person | None) -> None:
+        """What a page asks of the recording, of alarms, or of the scene and the images."""
         if message.get("type") == "marker":
             with contextlib.suppress(InputError):
                 self.recorder.mark("note", str(message.get("text", "")))
+        elif message.get("type") == "silence" and person is not None:
+            name, machine = str(message.get("name")), str(message.get("machine"))
+            self.alarm_log.silence(name, machine, person.who)
+            self._event("silence", person.who, {"name": name, "machine": machine})
         else:
             self._desk.on_message(message)

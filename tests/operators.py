@@ -76,6 +76,21 @@ class Operator:
         self.move(enable=True)
         self.wait(lambda: self.state(machine) in ("Enabled", "Active"))
 
+    def drive(self, machine: str, going: Callable[[], bool], **levers: float) -> None:
+        """Takes a machine and moves levers until `going`.
+
+        A busy computer may pause it on the way, or let the lease end: then once more.
+        """
+        end = time.monotonic() + 60.0
+        while not going():
+            assert time.monotonic() < end, self.snapshot.get("driving")
+            if not self.console(machine).get("held"):
+                self.take(machine)
+            if self.state(machine) not in ("Enabled", "Active"):
+                self.enable(machine)
+            self.move(**levers)
+            time.sleep(PERIOD)
+
     @property
     def seat(self) -> dict[str, Any]:
         found: dict[str, Any] = self.snapshot["driving"]["seats"].get(self.you["seat"], {})

@@ -67,9 +67,13 @@ def operator(station: Backend) -> Iterator[Operator]:
 
 def moving(operator: Operator, tap: Wiretap, k: int) -> None:
     """Up and down in turns, away from the partner."""
-    operator.enable("left")
-    operator.move(right_y=0.4 if k % 2 else -0.4)
-    operator.wait(lambda: bool(tap.commands) and bool(tap.commands[-1].velocity.any()))
+    lever = 0.4 if k % 2 else -0.4
+
+    def going() -> bool:
+        return bool(tap.commands) and bool(tap.commands[-1].velocity.any())
+
+    operator.move(enable=False, right_y=0.0)
+    operator.drive("left", going, right_y=lever)
 
 
 def zero_after(operator: Operator, tap: Wiretap, begun: float) -> float:
@@ -275,10 +279,8 @@ def test_kills_of_the_backend() -> None:
                 operator = Operator(station)
                 rearmed += operator.machine("left")["holder"] != ""
                 rearmed += tap.speed() > 0.02 and tap.statuses[-1].mode == "remote"
-                operator.take("left")
-                operator.enable("left")
-                operator.move(right_y=0.4 if k % 2 else -0.4)
-                operator.wait(lambda: tap.speed() > 0.05)
+                lever = 0.4 if k % 2 else -0.4
+                operator.drive("left", lambda: tap.speed() > 0.05, right_y=lever)
                 time.sleep(0.2)
                 killed = time.monotonic()
                 station.process.send_signal(signal.SIGKILL)

@@ -37,11 +37,9 @@ def tap(station: Backend) -> Iterator[Wiretap]:
 
 def moving(operator: Operator, tap: Wiretap, **levers: float) -> None:
     """Until the machine does what the levers say."""
-    operator.take("left")
-    operator.enable("left")
     # Up with the boom first, and away from the partner: free whatever the other machine does.
-    operator.move(**(levers or {"right_y": -0.5}))
-    operator.wait(lambda: tap.truths != [] and tap.speed() > 0.05)
+    going = levers or {"right_y": -0.5}
+    operator.drive("left", lambda: tap.truths != [] and tap.speed() > 0.05, **going)
 
 
 def test_sticks_move_the_machine_and_the_other_goes_on(operator: Operator, tap: Wiretap) -> None:

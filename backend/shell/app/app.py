@@ -16,10 +16,11 @@ from starlette.middleware.base import RequestResponseEndpoint
 from starlette.middleware.trustedhost import TrustedHostMiddleware
 
 from backend.control.person import SUPERVISOR, Person
+from backend.documents.alarms import AlarmsDocument
 from backend.errors import InputError
 from backend.fusion.pose import Validity
 from backend.pipeline.records import Snapshot
-from backend.shell.app.feed import Feed, Frames, Seats
+from backend.shell.app.feed import Feed, Frames, OnMessage, Seats
 from backend.shell.app.models import (
     HealthModel,
     MachineDescriptionModel,
@@ -51,16 +52,17 @@ class Sources:
     backend: live timings; on_message: what a page asks of the views (camera, own machine);
     what_if: judges a posture, called with a machine and joint values by role, in a worker thread;
     raises InputError for what it does not know; recording: None where nothing is ever recorded;
-    seats: None where nobody can drive.
+    seats: None where nobody can drive; alarms: of this run, None where none are kept.
     """
 
     site: dict[str, Any]
     frames: Frames
     backend: Callable[[], dict[str, Any]]
-    on_message: Callable[[dict[str, Any]], None]
+    on_message: OnMessage
     what_if: Callable[[str, dict[str, float]], dict[str, Any]]
     recording: RecordingSources | None = None
     seats: Seats | None = None
+    alarms: Callable[[], list[dict[str, Any]]] | None = None
 
 
 def create_app(
@@ -132,6 +134,13 @@ def create_app(
         if newest is None:
             return JSONResponse({"detail": "no cycle has finished yet"}, status_code=503)
         return _json(sources.frames.document(newest))
+
+    @app.get("/api/alarms", responses={200: {"model": AlarmsDocument}}, tags=["state"])
+    def alarms() -> Response:
+        """What lasts and what ended, with causes and how it ended; 404 in playback."""
+        if sources.alarms is None:
+            return JSONResponse({"detail": "a recorded session has its events"}, status_code=404)
+        return _json({"alarms": sources.alarms()})
 
     @app.post("/api/whatif", responses={200: {"model": WhatIfModel}}, tags=["state"])
     def what_if(request: WhatIfRequest) -> Response:

@@ -83,6 +83,10 @@ class Flow:
         return len(self._in_flight) < IN_FLIGHT
 
 
+OnMessage = Callable[[dict[str, Any], Person | None], None]
+"""Told what a page says, and whose page it is; None where nobody signs in."""
+
+
 class Seats(Protocol):
     """Where operators sit. open: a seat's name for a person; on_message: whether it was theirs."""
 
@@ -100,7 +104,7 @@ class Feed:
         self,
         frames: Frames,
         site: dict[str, Any],
-        on_message: Callable[[dict[str, Any]], None],
+        on_message: OnMessage,
         seats: Seats | None = None,
     ) -> None:
         self._hub = frames.hub
@@ -113,14 +117,14 @@ class Feed:
     async def serve(self, socket: WebSocket, person: Person | None = None) -> None:
         """person: who opened the page; without one, and without seats, it only looks."""
         if self._seats is None or person is None:
-            await self._serve(socket, self._on_message)
+            await self._serve(socket, lambda message: self._on_message(message, person))
             return
         seats, seat = self._seats, self._seats.open(person)
         you = {"type": "you", "seat": seat, "who": person.who, "role": person.role}
 
         def on_message(message: dict[str, Any]) -> None:
             if not seats.on_message(seat, message):
-                self._on_message(message)
+                self._on_message(message, person)
 
         try:
             await self._serve(socket, on_message, encode(you))
