@@ -14,6 +14,7 @@ from pathlib import Path
 from backend.errors import InputError
 from backend.machine.model import Machine
 from backend.shell.link.session import with_port
+from backend.shell.priority import FIRST, set_niceness
 from backend.site.site import Site, load_site
 from cockpit.announce import announce
 
@@ -36,6 +37,7 @@ def run_demo(
     from cockpit.options import Options
     from cockpit.station import Station
 
+    set_niceness(FIRST)
     site = load_site(site_name)
     endpoint = with_port(LOOPBACK)
     began = [float("inf")]
@@ -83,6 +85,7 @@ def run_serve(
     from cockpit.options import Options
     from cockpit.station import Station
 
+    set_niceness(FIRST)
     site = load_site(site_name)
     listen = listen or site.link.listen or (() if connect or site.link.connect else (LIVE,))
     listen = tuple(with_port(endpoint) for endpoint in listen)
@@ -105,6 +108,7 @@ def run_sim(
     """One simulated machine, until interrupted."""
     from backend.shell.sim.process import run
 
+    set_niceness(FIRST)
     site = load_site(site_name)
     site.machine(machine)
     run(site, machine, connect or (LIVE,), start_at, until)
@@ -134,6 +138,7 @@ def run_agent(
         interface, channel, bitrate, dbc = can
         return CanDriver(description, open_bus(interface, channel, bitrate), clock, dbc or DBC)
 
+    set_niceness(FIRST)
     site = load_site(site_name)
     site.machine(machine)
     run(site, machine, connect or (LIVE,), until, make)

@@ -69,12 +69,19 @@ class Operator:
         self.wait(lambda: self.machine(machine)["round_trip"] is not None)
 
     def enable(self, machine: str) -> None:
-        """Presses the dead-man anew, sticks in neutral."""
-        self.levers = dict(NOTHING)
-        self._tell()
-        time.sleep(3 * PERIOD)
-        self.move(enable=True)
-        self.wait(lambda: self.state(machine) in ("Enabled", "Active"))
+        """Presses the dead-man anew, sticks in neutral; again when it was paused on the way."""
+        end = time.monotonic() + 60.0
+        while self.state(machine) not in ("Enabled", "Active"):
+            assert time.monotonic() < end, self.snapshot.get("driving")
+            self.levers = dict(NOTHING)
+            self._tell()
+            time.sleep(6 * PERIOD)
+            self.move(enable=True)
+            pressed = time.monotonic()
+            while time.monotonic() - pressed < 1.0:
+                if self.state(machine) in ("Enabled", "Active"):
+                    return
+                time.sleep(0.005)
 
     def drive(self, machine: str, going: Callable[[], bool], **levers: float) -> None:
         """Takes a machine and moves levers until `going`.

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import contextlib
 import multiprocessing
-import os
 import signal
 from multiprocessing.connection import Connection
 from typing import Any
 
 from backend.pipeline.records import Snapshot
 from backend.shell.kinds import Made, Recipe, Wishes, make_images
+from backend.shell.priority import set_niceness
 
 NICENESS = 2
 """The fast loop goes before the images when processors are short."""
@@ -70,8 +70,7 @@ class ImageWorker:
 
 def _work(connection: Connection, recipe: Recipe) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's to answer
-    with contextlib.suppress(OSError):
-        os.nice(NICENESS)
+    set_niceness(NICENESS)
     while True:
         try:
             snapshot, wishes = connection.recv()

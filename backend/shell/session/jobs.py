@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import multiprocessing
-import os
 import signal
 import threading
 from collections.abc import Callable
@@ -12,6 +11,7 @@ from multiprocessing.connection import Connection
 from typing import Any
 
 from backend.errors import InputError
+from backend.shell.priority import set_niceness
 
 NICENESS = 5
 
@@ -82,8 +82,7 @@ class Job:
 
 def _child(connection: Connection, work: Callable[..., Any], args: tuple[Any, ...]) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's to answer
-    with contextlib.suppress(OSError):
-        os.nice(NICENESS)
+    set_niceness(NICENESS)
 
     def tell(kind: str, value: Any) -> None:
         connection.send((kind, value))

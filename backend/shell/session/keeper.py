@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from backend.errors import InputError
+from backend.shell.priority import set_niceness
 from backend.shell.session.format import Header, Message
 from backend.shell.session.repair import last_sequence, list_parts, repair_last
 from backend.shell.session.ring import (
@@ -246,8 +247,7 @@ def run(connection: Connection, plan: Plan) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's to answer
     signal.signal(signal.SIGTERM, lambda *_: terminated.append(time.monotonic()))
     signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
-    with contextlib.suppress(OSError):
-        os.nice(NICENESS)
+    set_niceness(NICENESS)
     keeper = Keeper(plan)
     with contextlib.suppress(EOFError, OSError):
         connection.send(keeper.begin())
