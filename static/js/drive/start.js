@@ -19,6 +19,8 @@ export function startDriving(give) {
   panel.startPanel(give);
   controls.startControls(give);
   editor.startEditor();
+  // The page leaves the keys of text fields alone.
+  for (const id of ["controls", "mapping"]) $(id).addEventListener("keydown", (event) => event.key === "Escape" && closeDialogs());
 }
 
 /** Of the window of the scene, besides its keys. */
