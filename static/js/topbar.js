@@ -52,7 +52,7 @@ function driven(name, parts) {
   parts.button.querySelector(".numbers").hidden = can;
   mark(parts.button, "active", can && consoleOf(name)?.state === "Active" && worst(name) === "CLEAR" ? 1 : 0);
   if (!can) return "";
-  const who = r.holder ? `R ${r.holder.length > 8 ? `${r.holder.slice(0, 7)}…` : r.holder}` : "M manual";
+  const who = r.holder ? `R ${r.holder.length > 7 ? `${r.holder.slice(0, 6)}…` : r.holder}` : "M manual";
   write(parts.holder, who);
   const level = r.level ?? "unknown";
   mark(parts.button, "delay", level);

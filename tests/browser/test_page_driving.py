@@ -645,6 +645,7 @@ def test_the_mapping_is_edited_kept_and_reset(feed: DriveFeed) -> None:
     page.get_by_label("left stick, right: axis").select_option("3")
     page.get_by_label("left stick, right: inverted").check()
     page.get_by_label("left stick, right: dead zone").fill("0.9")  # more than there is
+    page.keyboard.press("Tab")
     page.get_by_label("dead-man (hold): button").select_option("5")
     page.get_by_label("right stick, forwards: axis").select_option("null")
     feed.send(lambda: "Your own mapping" in page.inner_text("#mapping-answer"))

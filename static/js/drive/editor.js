@@ -104,7 +104,7 @@ export function update() {
   const devices = slots.map((pad, i) => (pad ? `${i + 1}: ${pad.id}` : "")).filter(Boolean);
   write($("mapping-devices"), devices.join(" · ") || pads.unavailable() || "No gamepad seen yet: press one of its buttons.");
   write($("mapping-answer"), store.complaint || (store.own() ? "Your own mapping, kept in this browser." : "Default mapping."));
-  const key = `${devices.join()} ${store.own() ? "" : "default"}`;
+  const key = `devices ${devices.join()}`;
   if (key !== built) {
     built = key;
     const mapping = store.mapping(slots);

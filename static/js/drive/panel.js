@@ -96,7 +96,7 @@ export function update() {
   stopButton();
   const shown = controllable(state.own);
   mark($("limits-panel"), "drive", shown ? 1 : 0);
-  for (const id of ["console-lamp", "console-state", "drive-words", "drive-tools"]) $(id).hidden = !shown;
+  for (const id of ["console-lamp", "console-state", "drive-words", "drive-tools"]) $(id).toggleAttribute("hidden", !shown);
   const mine = shown && holds(state.own);
   if (!mine && screen.open()) screen.toggle(false);
   mark($("limits-note"), "enforced", mine ? 1 : 0);
