@@ -13,6 +13,7 @@ import pytest
 from driving_frames import CAUSE, ZERO, DriveFeed, console, limited, remote, seat
 from playwright.sync_api import Browser
 from test_page_exact import CLIPPED, OUTSIDE, ExactFeed
+from test_page_recording import ON
 
 SIZES = [(1920, 1080), (1366, 768)]
 LB, LT, RT, DOWN = 4, 6, 7, 13
@@ -459,9 +460,25 @@ def test_request_release_hand_over_and_take_over(feed: DriveFeed) -> None:
     page.click("#lease")
     feed.send(lambda: feed.of("lease")[-1] == {**lease, "do": "release"})
     # Given away by this page: no alarm.
-    feed.machines["left"] = remote("bob")
+    feed.machines["left"] = remote()
     feed.seat = seat({})
     feed.send(lambda: feed.level() == "CLEAR" and page.inner_text("#lease") == "Request (R)")
+
+
+def test_only_who_was_offered_the_machine_takes_it_without_an_alarm(feed: DriveFeed) -> None:
+    page = feed.page
+    page.click("#controls-open")
+    page.keyboard.type("bob")
+    page.keyboard.press("Enter")
+    page.click("#controls-close")
+    feed.machines["left"] = remote("bob")
+    held, feed.seat = feed.seat, seat({})
+    feed.send(lambda: page.inner_text("#console-state") == "bob drives")
+    assert feed.level() == "CLEAR"
+    feed.seat, feed.machines["left"] = held, remote("anna")
+    feed.send(lambda: page.inner_text("#console-state") == "Idle")
+    feed.seat, feed.machines["left"] = seat({}), remote("carl")
+    feed.send(lambda: feed.level() == "STOP")
 
 
 def test_control_that_was_taken_away_is_an_alarm(feed: DriveFeed) -> None:
@@ -585,8 +602,11 @@ def test_an_operator_overrides_nothing(feed: DriveFeed) -> None:
 
 
 def test_what_is_enforced_is_shown_with_its_cause(feed: DriveFeed) -> None:
+    feed.page.click("#sticks-open")
     feed.still("Active")
     feed.seat = {**feed.seat, "decision": {"left": limited(0.4, 0.0)}}
+    pad = '#screen-sticks [data-lever="left"] [data-way="left"]'
+    feed.send(lambda: feed.page.inner_text(pad) == "swing left 40 %")
     feed.send(lambda: feed.shown("limits")["levers"]["left left"] == ["swing left", 40])
     shown = feed.shown("limits")
     assert shown["enforced"] is True
@@ -744,8 +764,8 @@ def test_screenshots(browser: Browser, size: tuple[int, int], artifacts: Path) -
 
     for name, say in situations(feed).items():
         say()
-        feed.send(lambda: True)
-        feed.send(lambda: True)
+        for _ in range(2):
+            feed.send(lambda: True, recording=ON)
         whole(feed, size)
         shoot(name)
         if name == "idle":
@@ -764,6 +784,7 @@ def test_screenshots(browser: Browser, size: tuple[int, int], artifacts: Path) -
             whole(feed, size)
             shoot("screen-sticks")
             feed.page.click("#sticks-open")
+            feed.page.mouse.move(5, 5)
     feed.page.keyboard.press("?")
     feed.send(lambda: True)
     shoot("help")

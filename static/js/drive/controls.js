@@ -63,7 +63,7 @@ function holderText() {
   const r = remote(state.own) ?? {};
   const refused = consoles()[state.own]?.refused;
   const who = r.holder ? `${label(state.own)} is driven by ${r.holder}` : `Nobody drives ${label(state.own)} remotely`;
-  return `${who}${r.offered_to ? `, offered to ${r.offered_to}` : ""}.${refused ? ` Refused: ${refused}.` : ""}`;
+  return `You are ${state.you?.who} (${state.you?.role}). ${who}${r.offered_to ? `, offered to ${r.offered_to}` : ""}.${refused ? ` Refused: ${refused}.` : ""}`;
 }
 
 /** Ten times a second. */

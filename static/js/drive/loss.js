@@ -8,10 +8,16 @@ const SHOWN = 60; // s
 
 let had = null; // the machines this page had
 let lost = null; // {name, line, detail, since}
-const given = new Set(); // machines this page let go of itself
+const given = new Map(); // machine -> {to, at}: let go of on this page
+const ANSWER = 3000; // ms that the server has for a release
 
-/** The operator gave it away: no alarm. */
-export const gave = (name) => given.add(name);
+/** The operator gave it back, or to somebody: no alarm when that is what happens. */
+export const gave = (name, to = "") => given.set(name, { to, at: performance.now() });
+
+function expected(name, other) {
+  const gift = given.get(name);
+  return Boolean(gift) && (gift.to ? other === gift.to : performance.now() - gift.at < ANSWER);
+}
 
 const stop = (name, machine, line, detail, since) => ({ level: "STOP", name, machine, line: `STOP · ${line}`, detail, since, active: true });
 
@@ -19,14 +25,14 @@ function watch() {
   const s = state.snapshot;
   for (const name of Object.keys(driving()?.machines ?? {})) {
     if (holds(name)) continue;
-    if (had?.has(name) && !given.has(name)) {
-      const other = remote(name)?.holder;
+    const other = remote(name)?.holder;
+    if (had?.has(name) && !expected(name, other)) {
       const [what, detail] = other && other !== state.you?.who ? ["passed on", `${other} drives ${label(name)}.`] : ["ended", ""];
       lost = { name, line: `${label(name)} control ${what} · ${wallClock(s.wall)}`, detail: `Your sticks are off. ${detail} Request: R.`.replace(/ {2}/g, " "), since: s.time };
     }
   }
   had = new Set(Object.keys(driving()?.machines ?? {}).filter(holds));
-  for (const name of [...given]) if (!had.has(name)) given.delete(name);
+  for (const name of [...given.keys()]) if (!had.has(name)) given.delete(name);
   if (lost && (holds(lost.name) || s.time - lost.since > SHOWN || s.time < lost.since)) lost = null;
 }
 

@@ -7,6 +7,7 @@ import { widest } from "../headers.js";
 import { controllable, driving, holds, latched, pattern, remote, seat } from "./driving.js";
 import { neutral } from "./deflection.js";
 import { input, override, stop } from "./operator.js";
+import { levers } from "./levers.js";
 import * as loss from "./loss.js";
 import * as say from "./say.js";
 import * as screen from "./screen.js";
@@ -17,7 +18,7 @@ let send = () => {};
 let shape = "";
 
 export function lease(what, more = {}) {
-  if (what === "release" || what === "hand_over") loss.gave(state.own);
+  if (what === "release" || what === "hand_over") loss.gave(state.own, more.to);
   send({ type: "lease", do: what, machine: state.own, to: "", reason: "", ...more });
 }
 
@@ -78,6 +79,7 @@ function stopButton() {
   const on = can && latched();
   $("reset").hidden = !on;
   mark($("stop"), "latched", on ? 1 : 0);
+  mark(document.body, "latched", on ? 1 : 0);
   write($("stop-state"), on ? "STOPPED" : "STOP");
   $("stop").title = "Stops every machine driven from here (Backspace). Not a safety-rated emergency stop: it goes through this browser and the radio.";
 }
@@ -121,6 +123,7 @@ export function update() {
   const cause = say.cause(state.own);
   write($("drive-cause"), cause);
   $("drive-cause").title = cause;
+  screen.label(levers(state.own).all);
   leaseButton(mine);
   const overriding = mine && Boolean(seat()?.override);
   $("drive-override").hidden = !overriding;

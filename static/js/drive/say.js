@@ -40,6 +40,7 @@ export function lines(name) {
   }
   const local = input();
   const driven = seat()?.driven;
+  if (!driven) return [`The sticks belong to no machine yet: press the key of ${label(name)}`, `Press the key of ${label(name)}`];
   if (driven !== name) return [`The sticks belong to ${label(driven)}. Let go, then press its key again`, `Sticks drive ${label(driven)}: let go, press key`, `Sticks drive ${label(driven)}`];
   if (r.locked && mine.state !== "Stop") return [`Locked: ${r.locked}`, `Locked: ${r.locked.split(": ")[0]}`];
   const why = mine.why || "";

@@ -1,6 +1,7 @@
 // Sticks on the screen, for fingers: each springs back when it is let go, and nothing moves unless ENABLE is held.
 
-import { $, mark } from "../words.js";
+import { $, mark, write } from "../words.js";
+import { isBlocked, isFree, percent } from "../plots/arrow.js";
 import { outside, zero } from "./deflection.js";
 
 const DEAD = 0.08; // of the way: a finger never rests exactly in the middle
@@ -68,6 +69,17 @@ export function toggle(show = !open()) {
   $("screen-sticks").hidden = !show;
   mark(document.body, "sticks", show ? 1 : 0);
   changed();
+}
+
+/** Beside each way of a pad what it moves, and how much of it is allowed. */
+export function label(levers) {
+  if (!open()) return;
+  for (const { lever, way, joint, word, allowed } of levers) {
+    const place = document.querySelector(`#screen-sticks [data-lever="${lever}"] [data-way="${way}"]`);
+    const free = isFree(allowed);
+    write(place, `${lever.startsWith("track") ? word : `${joint} ${word}`}${free ? "" : isBlocked(allowed) ? " ✕" : ` ${percent(allowed)}`}`);
+    mark(place, "limit", free ? "free" : isBlocked(allowed) ? "blocked" : "limited");
+  }
 }
 
 export function startScreen(onChange) {

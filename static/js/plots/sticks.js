@@ -61,7 +61,7 @@ function words(g, ways, x, y, width, pitch) {
     const free = isFree(one.allowed);
     const share = isBlocked(one.allowed) ? "blocked" : percent(one.allowed);
     g.font = font("tick", free ? 400 : 700);
-    const texts = free ? [`${one.joint} ${one.word}`] : [`${one.joint} ${one.word} ${share}`, `${one.word} ${share}`, share];
+    const texts = free ? [`${one.joint} ${one.word}`] : [`${one.joint} ${one.word} ${share}`, `${one.word} ${share}`, `${one.word} ${percent(one.allowed)}`];
     const text = texts.find((t) => g.measureText(t).width <= width - 1.4 * tick) ?? texts[texts.length - 1];
     label(g, text, x + 1.4 * tick, at, { base: "middle", colour: free ? C.second : C.text, weight: free ? 400 : 700 });
     cells.push({ x0: x, x1: x + width, y0: at - pitch / 2, y1: at + pitch / 2, ...one });
