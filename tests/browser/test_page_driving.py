@@ -489,6 +489,7 @@ def test_control_that_was_taken_away_is_an_alarm(feed: DriveFeed) -> None:
     assert line.inner_text().startswith("STOP · LEFT control passed on · ")
     assert len(line.inner_text()) <= 50
     assert detail.inner_text() == "Your sticks are off. bob drives LEFT. Request: R."
+    assert feed.page.locator(".machine .lamp rect").count() == 1  # LEFT is remote, not stopped
     feed.sent.clear()
     feed.send(lambda: True)
     assert not feed.of("sticks")
