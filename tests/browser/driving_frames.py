@@ -8,9 +8,7 @@ from playwright.sync_api import Browser, WebSocketRoute
 from test_page_exact import ExactFeed
 from test_page_offline import frame
 
-ZERO = dict.fromkeys(
-    ("left_x", "left_y", "right_x", "right_y", "track_left", "track_right"), 0.0
-)
+ZERO = dict.fromkeys(("left_x", "left_y", "right_x", "right_y", "track_left", "track_right"), 0.0)
 JOINTS = ("swing", "boom", "stick", "bucket", "track_left", "track_right")
 # Swing to the right is the negative side of this site's swing.
 CAUSE = "bucket must stop before boom: 0.42 m left"
@@ -134,5 +132,3 @@ class DriveFeed(ExactFeed):
 
     def press(self, button: int, value: float = 1, index: int = 0) -> None:
         self.page.evaluate("([b, v, i]) => window.made.press(b, v, i)", [button, value, index])
-
-

@@ -638,9 +638,7 @@ def test_every_state_says_what_to_do(feed: DriveFeed) -> None:
         ("Stop", "stopped by bob", "RESET"),
     ):
         feed.still(state, why=why)
-        feed.send(
-            lambda state=state: feed.page.inner_text("#console-state") == state
-        )
+        feed.send(lambda state=state: feed.page.inner_text("#console-state") == state)
         assert words.lower() in line.inner_text().lower()
         assert why in (line.get_attribute("title") or "").lower()
         seen.add(feed.page.locator("#console-lamp").inner_html())
