@@ -114,4 +114,5 @@ function list() {
   $("alarm-list").replaceChildren(make("ul", {}, ...items, ...said));
 }
 
-export const worst = (name) => alarms().filter((a) => a.machine === name).reduce((level, a) => (severity[a.level] > severity[level] ? a.level : level), "CLEAR");
+/** Of the machine itself: who drives it is no danger it is in. */
+export const worst = (name) => alarms().filter((a) => a.machine === name && !state.raised.includes(a)).reduce((level, a) => (severity[a.level] > severity[level] ? a.level : level), "CLEAR");

@@ -85,11 +85,40 @@ export function levelShape(level) {
   return [];
 }
 
-/** Lamp of a machine: disc = valid, dotted hollow ring = stale, ? = unknown. */
-export function lampShape(validity, level) {
+const letter = (text) => {
+  const node = svg("text", { x: 24, y: 34, "text-anchor": "middle", "font-size": 28, "font-weight": 700, "font-family": "Arial, sans-serif", fill: "#0B0F13" });
+  node.textContent = text;
+  return node;
+};
+const manual = () => [svg("circle", { cx: 24, cy: 24, r: 21, fill: "#2BB673" }), letter("M")];
+const remote = () => [svg("rect", { x: 3, y: 3, width: 42, height: 42, fill: "#4C9BFF" }), letter("R")];
+const bars = (fill) => svg("path", { d: "M13 9h8v30h-8zM27 9h8v30h-8z", fill });
+
+/** State of a console: each its own shape. */
+export function consoleShape(word) {
+  const ring = (dash = "none") => svg("circle", { cx: 24, cy: 24, r: 18, fill: "none", stroke: C.second, "stroke-width": 5, "stroke-dasharray": dash });
+  if (word === "Stop") return levelShape("STOP");
+  if (word === "Pause") return [bars(C.text)];
+  if (word === "Active") return remote();
+  if (word === "Enabled") return [svg("rect", { x: 5, y: 5, width: 38, height: 38, fill: "none", stroke: "#4C9BFF", "stroke-width": 6 })];
+  if (word === "Override") return [svg("rect", { x: 3, y: 3, width: 42, height: 42, fill: C.stop, stroke: "#FFFFFF", "stroke-width": 3 }), svg("path", { d: "M21 10h6v18h-6zM21 32h6v6h-6z", fill: "#FFFFFF" })];
+  return [ring(word === "Idle" ? "none" : "6 6")];
+}
+
+/** Delay of a link: disc, triangle, bar, ?. */
+export function delayShape(level) {
+  if (level === "ok") return [svg("circle", { cx: 24, cy: 24, r: 16, fill: "#2BB673" })];
+  if (level === "slow") return [svg("path", { d: "M24 6 44 41H4Z", fill: C.slow })];
+  if (level === "bad" || level === "locked") return [svg("path", { d: "M6 15h36v18H6z", fill: level === "locked" ? C.stop : "none", stroke: C.stopLine, "stroke-width": 5 })];
+  return [question(C.unknown)];
+}
+
+/** Lamp of a machine: disc = valid, dotted hollow ring = stale, ? = unknown; `driven` M (manual), R (remote) or STOP, where it can be driven. */
+export function lampShape(validity, level, driven = "") {
   if (validity === "VALID") {
-    if (level === "STOP") return [svg("polygon", { points: octagonPoints(23), fill: C.stop, stroke: "#FFFFFF", "stroke-width": 3 })];
+    if (driven === "STOP" || level === "STOP") return [svg("polygon", { points: octagonPoints(23), fill: C.stop, stroke: "#FFFFFF", "stroke-width": 3 })];
     if (level === "SLOW") return [svg("path", { d: "M24 4 46 43H2Z", fill: C.slow })];
+    if (driven) return driven === "M" ? manual() : remote();
     return [svg("circle", { cx: 24, cy: 24, r: 15, fill: "#C8D0D6" })];
   }
   if (validity === "STALE") return [svg("circle", { cx: 24, cy: 24, r: 18, fill: "none", stroke: C.stale, "stroke-width": 6, "stroke-dasharray": "5 6" })];

@@ -30,6 +30,7 @@ import * as recording from "./recording.js";
 import * as watermark from "./watermark.js";
 import { startSeries } from "./series_pointer.js";
 import { sessionKey } from "./keys.js";
+import * as drive from "./drive/start.js";
 
 readSizes();
 
@@ -56,6 +57,7 @@ const quantiles = (list) => {
 };
 
 function own(name) {
+  drive.chosen(name);
   if (!choose(name)) return;
   sessionStorage.setItem("own", name);
   socket.send({ type: "own", machine: name, page });
@@ -77,7 +79,8 @@ function switchImages() {
 
 function onKey(event) {
   if (event.ctrlKey || event.altKey || event.metaKey || /^(INPUT|SELECT|TEXTAREA)$/.test(event.target?.tagName ?? "")) return;
-  if (event.key >= "1" && event.key <= "9") own(names()[Number(event.key) - 1]);
+  if (drive.driveKey(event)) event.stopPropagation();
+  else if (event.key >= "1" && event.key <= "9") own(names()[Number(event.key) - 1]);
   else if (event.key === "?") help();
   else if (event.key === "a" || event.key === "A") alarm.silenceAlarms();
   else if (event.key === "m" || event.key === "M") toggleSound();
@@ -87,6 +90,7 @@ function onKey(event) {
   else if (event.key === "Escape") {
     sheets.close();
     recording.closeRecording();
+    drive.closeDialogs();
     hover.hide();
     ghost.unpin();
     alarm.showList(false);
@@ -106,8 +110,9 @@ topbar.startTopbar(own);
 alarm.startAlarm();
 startSound();
 demo.startDemo();
-startScene(onKey);
+startScene({ keydown: onKey, ...drive.sceneListeners });
 document.addEventListener("keydown", onKey);
+document.addEventListener("keyup", drive.onKeyUp);
 $("help-open").addEventListener("click", help);
 addEventListener("resize", () => {
   readSizes();
@@ -126,6 +131,7 @@ player.startPlayer(socket.send);
 transport.startTransport();
 recording.startRecording();
 startSeries(plots.trends);
+drive.startDriving(socket.send);
 
 function onFrame(header, arrays) {
   const { partner, snapshot: before } = state;
@@ -136,6 +142,7 @@ function onFrame(header, arrays) {
     tip.resend();
     for (const s of [...live, ...images]) s.dirty = true;
   } else if (header.type === "snapshot") {
+    drive.seen();
     push(latency.arrival, Date.now() - 1000 * header.wall);
     waitingToDraw = header.wall;
     for (const s of live) s.dirty = true;
@@ -153,6 +160,7 @@ function tick() {
   transport.update();
   sheets.update();
   recording.update();
+  drive.update();
   alarm.update();
   topbar.update();
   demo.update();

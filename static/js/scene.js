@@ -8,11 +8,12 @@ let built = "";
 /** This window's own scene: its camera must not follow another operator's buttons. */
 export const page = Array.from(crypto.getRandomValues(new Uint8Array(12)), (byte) => byte.toString(16).padStart(2, "0")).join("");
 
-export function startScene(onKey) {
+/** `listeners`: by type of event, for the window of the scene. */
+export function startScene(listeners) {
   const frame = $("scene");
   frame.addEventListener("load", () => {
     try {
-      frame.contentWindow.addEventListener("keydown", onKey, true);
+      for (const [type, listener] of Object.entries(listeners)) frame.contentWindow.addEventListener(type, listener, true);
     } catch {
       // another origin: the keys then work outside the scene only
     }

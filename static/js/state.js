@@ -8,7 +8,9 @@ const SWITCH = 0.3; // a new partner must be this much nearer [m], so that the p
 
 export const state = {
   site: null,
+  you: null, // {seat, who, role}: whose page this is
   snapshot: null,
+  raised: [], // alarms this page itself has to tell of
   arrival: -Infinity, // of the newest snapshot, performance.now() [ms]
   images: new Map(), // Sun's: "left<-right" -> {header, arrays, arrival, serial}
   exact: new Map(), // "left" -> the same
@@ -37,7 +39,8 @@ export const wall = () => state.snapshot?.playback?.wall ?? state.snapshot?.wall
 
 export function accept(header, arrays) {
   const now = performance.now();
-  if (header.type === "site") {
+  if (header.type === "you") state.you = header;
+  else if (header.type === "site") {
     state.site = header;
     if (!(state.own in header.machines)) state.own = header.own?.find((name) => name in header.machines) ?? names()[0];
     state.partner = null;
@@ -206,7 +209,7 @@ export const severity = { CLEAR: 0, SLOW: 1, STOP: 2, UNKNOWN: 3 };
 
 /** Alarms that count, the severest first, the own machine's before others' at the same level. */
 export function alarms() {
-  const active = (state.snapshot?.alarms ?? []).filter((a) => a.active !== false && severity[a.level] > 0);
+  const active = [...state.raised, ...(state.snapshot?.alarms ?? [])].filter((a) => a.active !== false && severity[a.level] > 0);
   const mine = (a) => (a.machine === state.own ? 0 : 1);
   return active.map((a, i) => [a, i]).sort(([a, i], [b, j]) => severity[b.level] - severity[a.level] || mine(a) - mine(b) || i - j).map(([a]) => a);
 }

@@ -1,11 +1,12 @@
 // Mode, site, one button per machine, backend, link.
 
-import { $, make, mark, slowText, write } from "./words.js";
+import { $, glyph, make, mark, slowText, write } from "./words.js";
 import { number, seconds } from "./axis.js";
 import { dataAge, label, link, machine, mode as modeOf, names, replaying, silence, state } from "./state.js";
-import { lampShape } from "./glyphs.js";
 import { soundFor } from "./sound.js";
 import { worst } from "./alarm.js";
+import { consoleOf, driving, remote } from "./drive/driving.js";
+import { delayShape, lampShape } from "./glyphs.js";
 
 const FIX = { RTK_FIXED: "RTK fixed", RTK_FLOAT: "RTK float", FIXED: "RTK fixed", FLOAT: "RTK float", DGNSS: "DGNSS", SINGLE: "single fix", NONE: "no fix" };
 
@@ -28,20 +29,39 @@ function build() {
   const many = names().length > 2;
   mark($("machines"), "many", many ? 1 : 0);
   $("machines").replaceChildren(...names().map((name, index) => {
-    const lamp = document.createElementNS("http://www.w3.org/2000/svg", "svg");
-    lamp.setAttribute("viewBox", "0 0 48 48");
-    lamp.setAttribute("class", "lamp");
-    lamp.setAttribute("aria-hidden", "true");
+    const lamp = glyph("lamp"), delay = glyph("delay");
     const word = make("span", { class: "word" });
     const extra = make("span", { class: "extra dim" });
     const numbers = make("span", { class: "numbers dim" });
-    const button = make("button", { type: "button", class: "machine", title: `Own machine: ${label(name)} (key ${index + 1})` },
+    const holder = make("span", { class: "holder" }), trip = make("span", { class: "trip" });
+    const button = make("button", { type: "button", class: "machine" },
       lamp, make("span", { class: "name", text: label(name) }), make("span", { class: "key", text: String(index + 1) }),
-      make("span", { class: "pair" }, make("span", {}, word, extra), numbers));
+      make("span", { class: "pair" }, make("span", {}, word, extra), numbers, make("span", { class: "drive", hidden: "" }, holder, delay, trip)));
     button.addEventListener("click", () => own(name));
-    machines.set(name, { button, lamp, word, extra, numbers: slowText(numbers), shape: "" });
+    machines.set(name, { button, lamp, word, extra, numbers: slowText(numbers), holder, delay, trip: slowText(trip), shape: "", level: "" });
     return button;
   }));
+}
+
+/** Who drives it remotely, how far away they are, and its lamp; nothing where it cannot be driven. */
+function driven(name, parts) {
+  const r = remote(name);
+  const can = r?.agent === true;
+  const line = parts.holder.parentElement;
+  line.hidden = !can;
+  parts.button.querySelector(".numbers").hidden = can;
+  mark(parts.button, "active", can && consoleOf(name)?.state === "Active" && worst(name) === "CLEAR" ? 1 : 0);
+  if (!can) return "";
+  const who = r.holder ? `R ${r.holder.length > 7 ? `${r.holder.slice(0, 6)}…` : r.holder}` : "M manual";
+  write(parts.holder, who);
+  const level = r.level ?? "unknown";
+  mark(parts.button, "delay", level);
+  parts.trip(Number.isFinite(r.round_trip) ? `${number(1000 * r.round_trip, 0)} ms` : "–", level);
+  if (parts.level !== level) {
+    parts.level = level;
+    parts.delay.replaceChildren(...delayShape(level));
+  }
+  return r.mode === "stopped" ? "STOP" : r.holder ? "R" : "M";
 }
 
 function fixWord(fix) {
@@ -66,8 +86,9 @@ export function update() {
   if (!s) return;
   const mode = modeOf();
   write($("mode"), mode);
+  const monitoring = replaying() ? "A recorded session. Nothing on this page reaches a machine." : "Monitoring only: no machine control from this page yet.";
   write($("stop-word"), replaying() ? "Recorded: no machine" : "Monitoring only, no control");
-  $("stop-place").title = replaying() ? "A recorded session. Nothing on this page reaches a machine. This operator aid is not a safety-rated stop." : "Monitoring only: no machine control from this page yet. This operator aid is not a safety-rated stop.";
+  $("stop-place").title = driving() ? "" : `${monitoring} This operator aid is not a safety-rated stop.`;
   mark($("mode"), "mode", mode);
   const ms = s.backend?.cycle_ms ?? s.backend?.step;
   const hz = s.backend?.rate_hz ?? s.backend?.step?.rate;
@@ -83,9 +104,10 @@ export function update() {
     mark(parts.button, "validity", validity);
     parts.button.setAttribute("aria-pressed", String(name === state.own));
     const level = worst(name);
-    if (parts.shape !== validity + level) {
-      parts.shape = validity + level;
-      parts.lamp.replaceChildren(...lampShape(validity, level));
+    const lamp = driven(name, parts);
+    if (parts.shape !== validity + level + lamp) {
+      parts.shape = validity + level + lamp;
+      parts.lamp.replaceChildren(...lampShape(validity, level, lamp));
     }
     write(parts.word, validity);
     write(parts.extra, ` ${fixWord(m.fix)}`);
@@ -93,6 +115,9 @@ export function update() {
     const hz = m.rates?.joints;
     const text = Number.isFinite(age) ? `${number(age, 2)} s` : "no data";
     parts.numbers(machines.size > 2 ? text : `${text} · ${Number.isFinite(hz) ? `${number(hz, 0)} Hz` : "– Hz"}`, validity);
-    parts.button.setAttribute("aria-label", `${label(name)}, ${validity}, ${fixWord(m.fix)}`);
+    const r = remote(name);
+    const drive = lamp ? `, ${r.holder ? `driven remotely by ${r.holder}` : "driven manually"}${lamp === "STOP" ? ", stopped" : ""}` : "";
+    parts.button.setAttribute("aria-label", `${label(name)}, ${validity}, ${fixWord(m.fix)}${drive}`);
+    parts.button.title = `Own machine: ${label(name)} (key ${names().indexOf(name) + 1})${lamp ? `${drive}; data ${text}${r.locked ? `; locked: ${r.locked}` : ""}` : ""}`;
   }
 }

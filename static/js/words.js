@@ -13,6 +13,13 @@ export function make(tag, attributes = {}, ...children) {
   return node;
 }
 
+/** An empty drawing of 48 by 48 for the shapes of glyphs.js. */
+export function glyph(name) {
+  const node = document.createElementNS("http://www.w3.org/2000/svg", "svg");
+  for (const [attribute, value] of [["viewBox", "0 0 48 48"], ["class", name], ["aria-hidden", "true"]]) node.setAttribute(attribute, value);
+  return node;
+}
+
 /** Writes only what differs, so that an idle page stays idle. */
 export function write(node, text) {
   if (node.textContent !== text) node.textContent = text;
