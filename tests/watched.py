@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, Page
+from playwright.sync_api import Browser, BrowserContext, Page
 
 SIZES = [(1920, 1080), (1366, 768)]
 CANVASES = ["plan", "reach", "slice-0", "slice-1", "slice-2", "bars", "limits", "trends"]
@@ -20,9 +20,10 @@ STATES = """ids => Object.fromEntries(ids.map(id => {
 class Watched:
     """A page whose console is kept: an error there is a failure."""
 
-    def __init__(self, browser: Browser, url: str, size: tuple[int, int]) -> None:
+    def __init__(self, browser: Browser | BrowserContext, url: str, size: tuple[int, int]) -> None:
         width, height = size
-        self.page: Page = browser.new_page(viewport={"width": width, "height": height})
+        self.page: Page = browser.new_page()
+        self.page.set_viewport_size({"width": width, "height": height})
         # Drawn by the processor, beside all processes of a site: a picture can take its time.
         self.page.set_default_timeout(120_000)
         self.errors: list[str] = []

@@ -1,0 +1,184 @@
+"""A machine driven from the page, with a gamepad, through the real processes."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from driving_frames import GAMEPAD
+from live import Backend, all_valid, serve, simulated
+from playwright.sync_api import Browser
+from watched import SIZES, Watched
+
+pytestmark = [pytest.mark.browser, pytest.mark.processes, pytest.mark.timeout(400)]
+LB = 4  # the dead-man
+# A pad's axes (forwards is negative) that raise each joint's value, in ISO's pattern.
+AXES = {"swing": (0, -1.0), "boom": (3, 1.0), "stick": (1, -1.0), "bucket": (2, 1.0)}
+NEAR = 0.12  # [rad]
+# Dig at the trench, carry away from the partner, dump, and back; differences to the start [rad].
+CYCLE: tuple[tuple[str, dict[str, float]], ...] = (
+    ("dig", {"boom": -0.35, "stick": -0.2, "bucket": 0.0}),
+    ("fill", {"bucket": -0.6}),
+    ("lift", {"boom": 0.25}),
+    ("swing", {"swing": -0.6}),
+    ("dump", {"bucket": 0.9}),
+    ("back", {"swing": 0.0}),
+)
+
+
+class Pad:
+    """The page of one operator with a made-up gamepad in their hands."""
+
+    def __init__(self, browser: Browser, url: str, size: tuple[int, int]) -> None:
+        context = browser.new_context(viewport={"width": size[0], "height": size[1]})
+        context.add_init_script(GAMEPAD)
+        self.watched = Watched(context, url, size)
+        self.page = self.watched.page
+        self.page.evaluate(
+            """() => { window.made.pads.push(window.made.pad(0, "Pad", 4, 17, "standard"));
+              dispatchEvent(new Event("gamepadconnected")); }"""
+        )
+
+    def axis(self, number: int, value: float) -> None:
+        self.page.evaluate("([n, v]) => { window.made.pads[0].axes[n] = v; }", [number, value])
+
+    def rest(self) -> None:
+        self.page.evaluate("() => window.made.pads[0].axes.fill(0)")
+
+    def dead_man(self, held: bool) -> None:
+        self.page.evaluate("v => window.made.press(4, v)", 1 if held else 0)
+
+    def seat(self) -> dict[str, Any]:
+        snapshot = self.watched.snapshot()
+        number = self.page.evaluate("window.cockpit.state.you?.seat")
+        found: dict[str, Any] = snapshot["driving"]["seats"].get(number, {})
+        return found
+
+    def state(self, machine: str = "left") -> str:
+        return str(self.seat().get("consoles", {}).get(machine, {}).get("state", ""))
+
+    def wait(self, condition: Any, timeout: float = 40.0) -> None:
+        end = time.monotonic() + timeout
+        while not condition():
+            assert time.monotonic() < end, json.dumps(self.watched.snapshot()["driving"])[:1500]
+            time.sleep(0.05)
+
+    def arm(self) -> None:
+        """Request, dead-man; again when a busy computer pauses it."""
+        if self.state() in ("", "Reserved"):
+            self.page.keyboard.press("r")
+            self.wait(lambda: self.state() not in ("", "Reserved"))
+        while self.state() not in ("Enabled", "Active"):
+            self.rest()
+            self.dead_man(False)
+            time.sleep(0.3)
+            self.dead_man(True)
+            time.sleep(0.7)
+
+    def joints(self) -> dict[str, float]:
+        found: dict[str, float] = self.watched.snapshot()["machines"]["left"]["joints"]
+        return found
+
+    def move(self, goal: dict[str, float], timeout: float = 60.0) -> None:
+        """By eye: until every joint named is near its goal."""
+        end = time.monotonic() + timeout
+        while time.monotonic() < end:
+            now = self.joints()
+            left = {role: value - now[role] for role, value in goal.items()}
+            if all(abs(value) < NEAR for value in left.values()):
+                self.rest()
+                return
+            if self.state() not in ("Enabled", "Active"):
+                self.arm()
+            for role, value in left.items():
+                number, way = AXES[role]
+                speed = 0.0 if abs(value) < NEAR / 2 else max(min(1.5 * value, 1.0), -1.0)
+                speed = speed if abs(speed) > 0.3 or not speed else 0.3 * speed / abs(speed)
+                self.axis(number, way * speed)
+            time.sleep(0.05)
+        raise AssertionError(f"{goal} was not reached: {self.joints()}, {self.seat()}")
+
+
+@pytest.fixture(scope="module")
+def station() -> Iterator[Backend]:
+    with serve("demo", "--no-record") as running:
+        with simulated("demo", running.endpoint, "left", "right"):
+            running.wait_for(all_valid)
+            yield running
+
+
+def test_dig_swing_and_dump_by_stick_while_the_other_works(
+    browser: Browser, station: Backend, artifacts: Path
+) -> None:
+    pad = Pad(browser, station.url, SIZES[0])
+    pad.arm()
+    start = pad.joints()
+    right = station.get("/api/snapshot")["machines"]["right"]["joints"]
+    travelled = 0.0
+    for name, change in CYCLE:
+        before = pad.joints()
+        goal = {role: start[role] + by for role, by in change.items()}
+        pad.move(goal)
+        after = pad.joints()
+        travelled += sum(abs(after[role] - before[role]) for role in after)
+        if name == "swing":
+            pad.page.screenshot(path=artifacts / "driving-live-1920x1080.png")
+    assert travelled > 2.0
+    document = station.get("/api/snapshot")
+    machines = document["driving"]["machines"]
+    assert machines["left"]["mode"] == "remote"
+    assert machines["left"]["holder"]
+    assert machines["right"]["holder"] == ""
+    now = document["machines"]["right"]["joints"]
+    assert max(abs(now[role] - right[role]) for role in now) > 0.05  # it worked meanwhile
+    # What the page shows is what is sent.
+    shown = pad.watched.canvases()["limits"]["state"]
+    assert shown["enforced"] is True
+    pad.dead_man(False)
+    pad.wait(lambda: pad.state() == "Pause")
+    assert "dead-man" in pad.page.inner_text("#drive-words").lower() or "LB" in pad.page.inner_text(
+        "#drive-words"
+    )
+    assert pad.watched.errors == []
+    pad.page.context.close()
+
+
+def test_stop_on_the_page_latches(browser: Browser, station: Backend) -> None:
+    pad = Pad(browser, station.url, SIZES[1])
+    pad.arm()
+    pad.page.keyboard.press("Backspace")
+    pad.wait(lambda: pad.state() == "Stop")
+    pad.dead_man(False)
+    time.sleep(0.3)
+    pad.dead_man(True)
+    time.sleep(0.5)
+    assert pad.state() == "Stop"
+    pad.dead_man(False)
+    time.sleep(0.3)
+    pad.page.click("#reset")
+    pad.wait(lambda: pad.state() == "Idle")
+    assert pad.watched.errors == []
+    pad.page.context.close()
+
+
+def test_from_a_closed_browser_to_a_moving_machine(browser: Browser, station: Backend) -> None:
+    """Actions: open the page, request, hold the dead-man, move a stick."""
+    pad = Pad(browser, station.url, SIZES[1])
+    actions = ["open the page"]
+    pad.page.keyboard.press("r")
+    actions.append("request")
+    pad.wait(lambda: pad.state() == "Idle")
+    time.sleep(0.3)
+    pad.dead_man(True)
+    actions.append("hold the dead-man")
+    pad.wait(lambda: pad.state() == "Enabled")
+    before = pad.joints()["boom"]
+    pad.axis(3, 0.6)
+    actions.append("move a stick")
+    pad.wait(lambda: abs(pad.joints()["boom"] - before) > 0.03)
+    assert len(actions) <= 6
+    pad.page.context.close()
