@@ -19,6 +19,9 @@ const pad = (index, id, axes, buttons, mapping) => ({
   buttons: Array.from({length: buttons}, () => ({pressed: false, touched: false, value: 0}))});
 window.made = {pads: [], pad, press: (button, value = 1, index = 0) =>
   Object.assign(window.made.pads[index].buttons[button], {pressed: value >= 0.5, value})};
+// Frozen: nothing is sent in time, only what an event sends at once.
+const every = window.setInterval;
+window.setInterval = (act, ms) => every(() => (ms === 25 && window.made.frozen) || act(), ms);
 Object.defineProperty(Navigator.prototype, "getGamepads", {value: () => window.made.pads});
 """
 
@@ -125,6 +128,11 @@ class DriveFeed(ExactFeed):
               dispatchEvent(new Event("gamepadconnected")); }""",
             [ident, axes, mapping],
         )
+
+    def freeze(self, on: bool = True) -> None:
+        self.page.evaluate("on => { window.made.frozen = on; }", on)
+        self.page.wait_for_timeout(30)
+        self.sent.clear()
 
     def axes(self, *values: float, index: int = 0) -> None:
         script = "([v, i]) => { Object.assign(window.made.pads[i].axes, v); }"

@@ -3,10 +3,9 @@
 import { $, make, write } from "../words.js";
 import { label, state } from "../state.js";
 import { consoles, controllable, driving, holds, remote, seat, supervisor } from "./driving.js";
-import { lease, pause } from "./panel.js";
+import { lease, overrideReason, pause } from "./asks.js";
 import { openMapping } from "./editor.js";
 
-let send = () => {};
 let others = "";
 
 function answer(text, kind = "") {
@@ -38,8 +37,7 @@ function submit(form, field, need, act) {
   });
 }
 
-export function startControls(give) {
-  send = give;
+export function startControls() {
   submit("hand-over", "hand-to", "To whom?", (to) => {
     lease("hand_over", { to });
     answer(`Offered to ${to}.`);
@@ -49,10 +47,10 @@ export function startControls(give) {
     answer("Asked to take over.");
   });
   submit("override-form", "override-why", "An override needs a reason: it is recorded.", (reason) => {
-    send({ type: "override", reason });
+    overrideReason(reason);
     answer("Hold OVERRIDE or O to run; the dead-man as well.");
   });
-  $("override-clear").addEventListener("click", () => send({ type: "override", reason: "" }));
+  $("override-clear").addEventListener("click", () => overrideReason(""));
   $("release-more").addEventListener("click", () => lease("release"));
   $("pause").addEventListener("click", pause);
   $("mapping-more").addEventListener("click", openMapping);

@@ -22,6 +22,9 @@ export function leaveScene() {
   if (!document.hasFocus()) lose();
 }
 
+/** Who comes back to the window may come back to the scene in it. */
+export const enterScene = gain;
+
 export function startFocus(scene, onChange) {
   changed = onChange;
   addEventListener("blur", () => {

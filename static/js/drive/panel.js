@@ -4,48 +4,27 @@ import { $, mark, write } from "../words.js";
 import { label, state } from "../state.js";
 import { consoleShape } from "../glyphs.js";
 import { widest } from "../headers.js";
+import * as asks from "./asks.js";
 import { controllable, driving, holds, latched, pattern, remote, seat } from "./driving.js";
 import { neutral } from "./deflection.js";
 import { input, override, stop } from "./operator.js";
 import { levers } from "./levers.js";
-import * as loss from "./loss.js";
 import * as say from "./say.js";
 import * as screen from "./screen.js";
 import { openControls } from "./controls.js";
 import { openMapping } from "./editor.js";
 
-let send = () => {};
 let shape = "";
 
-export function lease(what, more = {}) {
-  if (what === "release" || what === "hand_over") loss.gave(state.own, more.to);
-  send({ type: "lease", do: what, machine: state.own, to: "", reason: "", ...more });
-}
-
-/** R: asks for the own machine, or accepts it. */
-export function request() {
-  if (!controllable(state.own) || holds(state.own)) return false;
-  lease("request");
-  return true;
-}
-
-export function pause() {
-  if (!holds(state.own)) return false;
-  send({ type: "pause" });
-  return true;
-}
-
-const set = (changes) => send({ type: "setting", pattern: pattern(), fine: Boolean(seat()?.fine), ...changes });
-
-export const still = () => neutral(input().deflection) && neutral(seat()?.sticks) && !input().enable;
+const still = () => neutral(input().deflection) && neutral(seat()?.sticks) && !input().enable;
 
 const enabled = (node, on) => {
   if (node.disabled === on) node.disabled = !on;
 };
 
 function pressLease() {
-  if (holds(state.own)) lease("release");
-  else request();
+  if (holds(state.own)) asks.lease("release");
+  else asks.request();
 }
 
 /** A button that acts while it is held, by pointer or by Enter. */
@@ -59,13 +38,12 @@ function hold(button, act) {
   button.addEventListener("keyup", (event) => event.key === "Enter" && act(false));
 }
 
-export function startPanel(give) {
-  send = give;
+export function startPanel() {
   $("stop").addEventListener("click", stop);
-  $("reset").addEventListener("click", () => send({ type: "reset" }));
+  $("reset").addEventListener("click", asks.reset);
   $("lease").addEventListener("click", pressLease);
-  $("pattern").addEventListener("click", () => still() && set({ pattern: pattern() === "ISO" ? "SAE" : "ISO" }));
-  $("fine").addEventListener("click", () => set({ fine: !seat()?.fine }));
+  $("pattern").addEventListener("click", () => still() && asks.setting({ pattern: pattern() === "ISO" ? "SAE" : "ISO" }));
+  $("fine").addEventListener("click", () => asks.setting({ fine: !seat()?.fine }));
   $("sticks-open").addEventListener("click", () => screen.toggle());
   $("mapping-open").addEventListener("click", openMapping);
   $("controls-open").addEventListener("click", openControls);

@@ -2,34 +2,30 @@
 
 import { $ } from "../words.js";
 import { state } from "../state.js";
-import { controllable, driving, holds, seat } from "./driving.js";
+import { controllable, driving } from "./driving.js";
+import * as asks from "./asks.js";
 import * as controls from "./controls.js";
 import * as editor from "./editor.js";
 import * as keyboard from "./keyboard.js";
 import * as loss from "./loss.js";
 import * as operator from "./operator.js";
 import * as panel from "./panel.js";
-import { leaveScene } from "./focus.js";
-
-let send = () => {};
+import { enterScene, leaveScene } from "./focus.js";
 
 export function startDriving(give) {
-  send = give;
+  asks.startAsks(give);
   operator.startOperator(give, $("scene"));
-  panel.startPanel(give);
-  controls.startControls(give);
+  panel.startPanel();
+  controls.startControls();
   editor.startEditor();
   // The page leaves the keys of text fields alone.
   for (const id of ["controls", "mapping"]) $(id).addEventListener("keydown", (event) => event.key === "Escape" && closeDialogs());
 }
 
 /** Of the window of the scene, besides its keys. */
-export const sceneListeners = { keyup: onKeyUp, blur: leaveScene };
+export const sceneListeners = { keyup: onKeyUp, focus: enterScene, blur: leaveScene };
 
-/** The own machine was chosen: where this seat has it, the sticks follow. */
-export function chosen(name) {
-  if (holds(name) && seat()?.driven !== name) send({ type: "drive", machine: name });
-}
+export const { chosen } = asks;
 
 /** True when the key was meant for a machine. Text fields and dialogs keep theirs. */
 export function driveKey(event) {
@@ -40,8 +36,8 @@ export function driveKey(event) {
   }
   if (operator.press(event)) return true;
   if (event.repeat) return false;
-  if (event.code === "KeyR") return panel.request();
-  if (event.code === "KeyP") return panel.pause();
+  if (event.code === "KeyR") return asks.request();
+  if (event.code === "KeyP") return asks.pause();
   return false;
 }
 
