@@ -6,6 +6,13 @@ import json
 
 from pydantic import BaseModel
 
+from backend.documents.access import (
+    AuditEntry,
+    EntranceDocument,
+    MeDocument,
+    UsersDocument,
+    UsersFileDocument,
+)
 from backend.documents.assessment import AssessmentDocument
 from backend.documents.bench import BenchDocument
 from backend.documents.conversion import ConversionDocument, ExportDocument
@@ -34,6 +41,11 @@ SCHEMAS: dict[str, tuple[type[BaseModel], str]] = {
     "session": (SessionDocument, "/api/session"),
     "series": (SeriesDocument, "/api/session/series"),
     "diff": (DiffDocument, "what diff --json prints, and /api/session/diff"),
+    "users": (UsersDocument, "what users list --json prints"),
+    "users-file": (UsersFileDocument, "the users file"),
+    "me": (MeDocument, "/api/me"),
+    "entrance": (EntranceDocument, "GET /api/login"),
+    "audit": (AuditEntry, "one line of the audit log"),
     "site-file": (SiteTable, "a site file, as TOML"),
 }
 

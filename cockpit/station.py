@@ -25,7 +25,7 @@ from backend.shell.link.session import open_session
 from backend.shell.link.source import LinkSource
 from backend.shell.runner import Runner
 from backend.site.site import Site
-from cockpit.desk import LOOPBACK, Desk, image_loops, load_models, make_config
+from cockpit.desk import Desk, image_loops, load_models, make_config
 from cockpit.options import Options
 from cockpit.recording import make_recorder, recording_sources
 from cockpit.resolutions import resolutions
@@ -42,7 +42,7 @@ class Station:
         options: Options,
         demo_began: Callable[[], float] | None = None,
     ) -> None:
-        listener = bind(options.host, options.port)
+        listener = bind(options.entry.host, options.port)
         self._closing = contextlib.ExitStack()
         self._closing.callback(listener.close)
         try:
@@ -94,14 +94,20 @@ class Station:
             what_if=self._desk.what_if,
             recording=recording_sources(self.recorder, site, options),
         )
-        hooks = Hooks(opened=self.view.attach, closed=self.view.detach)
-        loopback = options.host in LOOPBACK
+        self.access = access = options.entry.access(listener.getsockname()[1])
+        self._closing.callback(access.close)
+        hooks = Hooks(
+            allow=lambda connection: access.identify(connection) is not None,
+            opened=self.view.attach,
+            closed=self.view.detach,
+        )
         app = create_app(
             sources,
             viewer_router(lambda: self.view.port, hooks, HEAD),
-            hosts=LOOPBACK if loopback else ("*",),
+            hosts=options.entry.hosts,
+            access=access,
         )
-        self.web = WebServer(app, listener)
+        self.web = WebServer(app, listener, options.entry.tls)
         self.recorder.start()
         self._closing.callback(self.recorder.close)
         self.runner.start()

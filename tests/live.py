@@ -21,6 +21,7 @@ from websockets.sync.client import ClientConnection, connect
 from backend.shell.app.wire import decode
 from backend.shell.link.session import with_port
 
+LOCAL = ("--no-login",)  # signing in has tests of its own
 ENVIRONMENT = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
 
 
@@ -97,7 +98,7 @@ def listen(process: subprocess.Popen[str], word: str) -> tuple[list[str], thread
 @contextlib.contextmanager
 def backend(command: str, *arguments: str, endpoint: str | None = None) -> Iterator[Backend]:
     """`cockpit COMMAND ...` on a free port, once it says where its page is."""
-    process = start(command, "--port", "0", "--no-browser", *arguments)
+    process = start(command, "--port", "0", "--no-browser", *LOCAL, *arguments)
     output, ready = listen(process, "tcp/")
     try:
         assert ready.wait(60.0), f"no start within 60 s: {output}"
@@ -149,7 +150,7 @@ def frames(socket: ClientConnection, seconds: float) -> Iterator[tuple[float, di
 @contextlib.contextmanager
 def playback(path: Path, *options: str) -> Iterator[Backend]:
     """`cockpit play PATH`, once its page is up."""
-    process = start("play", str(path), "--port", "0", "--no-browser", *options)
+    process = start("play", str(path), "--port", "0", "--no-browser", *LOCAL, *options)
     output, ready = listen(process, "PLAYBACK")
     try:
         assert ready.wait(90.0), output
