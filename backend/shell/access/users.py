@@ -112,7 +112,7 @@ class Users:
 
     def __init__(self, path: Path, clock: Callable[[], float] = time.monotonic) -> None:
         """Raises InputError, also for a file without users."""
-        self._path, self._clock = path, clock
+        self.path, self._clock = path, clock
         self._users = read_users(path)
         if not self._users:
             raise InputError(
@@ -126,12 +126,12 @@ class Users:
         user = self._now().get(name)
         if not matches(None if user is None else user.password, password) or user is None:
             return None
-        return Person(name, user.role), _seal(user)
+        return Person(name, user.role), seal_of(user)
 
     def person(self, name: str, seal: str) -> Person | None:
         """Somebody who signed in, as the file has them now; None: removed, or a new password."""
         user = self._now().get(name)
-        return Person(name, user.role) if user is not None and _seal(user) == seal else None
+        return Person(name, user.role) if user is not None and seal_of(user) == seal else None
 
     def knows(self, name: str) -> bool:
         return name in self._now()
@@ -147,7 +147,7 @@ class Users:
                 elif mark != self._seen:
                     self._seen = mark
                     try:
-                        self._users = read_users(self._path)
+                        self._users = read_users(self.path)
                     except InputError as error:  # somebody is at it: as it was, until it is whole
                         log.error("the users stay as they were: %s", error)
             return self._users
@@ -155,7 +155,7 @@ class Users:
     def _mark(self) -> tuple[int, int, int] | None:
         """What changes when the file does; None when there is none."""
         try:
-            stat = self._path.stat()
+            stat = self.path.stat()
         except OSError:
             return None
         return stat.st_ino, stat.st_ctime_ns, stat.st_size
@@ -211,6 +211,6 @@ def _checked_role(role: str) -> None:
         raise InputError(f'--role "{role}" is unknown; allowed are {", ".join(ROLES)}.')
 
 
-def _seal(user: UserEntry) -> str:
+def seal_of(user: UserEntry) -> str:
     """Changes with the password: what was signed in with the old one is signed out."""
     return hashlib.sha256(user.password.encode()).hexdigest()[:32]
