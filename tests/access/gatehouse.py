@@ -27,7 +27,7 @@ from backend.shell.app.feed import Frames
 from backend.shell.app.recording import RecordingSources
 from backend.shell.app.server import WebServer, bind
 from backend.shell.app.session_api import session_router
-from backend.shell.app.viewer_proxy import Hooks, viewer_router, views_only
+from backend.shell.app.viewer_proxy import Hooks, viewer_router
 from backend.shell.hub import Hub
 
 PROTOCOL = Subprotocol("viser-v1.1.1")
@@ -148,7 +148,7 @@ def house(
     links: Links | None = None,
     tls: Tls | None = None,
     sessions: Sessions | None = None,
-    may_send: Any = views_only,
+    hooks: Hooks | None = None,
     **more: Any,
 ) -> Iterator[House]:
     scene, said = Scene(), []
@@ -172,7 +172,7 @@ def house(
     )
     app = create_app(
         sources,
-        viewer_router(lambda: scene.port, Hooks(may_send=may_send)),
+        viewer_router(lambda: scene.port, hooks or Hooks()),
         hosts=("127.0.0.1", "localhost"),
         routers=(session_router(Playback()),),
         access=access,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import re
 import time
@@ -15,10 +16,14 @@ import pytest
 from fastapi.routing import APIRoute
 from gatehouse import HTML, PEOPLE, House, house
 from starlette.routing import BaseRoute, Mount, Route, WebSocketRoute
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection
 
-from backend.shell.access.users import set_role
+from backend.control.person import Person
+from backend.shell.access.users import set_password, set_role
+from backend.shell.app.gate import Gate
+from backend.shell.app.viewer_proxy import Hooks
 
 STATIC = Path(__file__).resolve().parents[2] / "static"
 OPEN = {("GET", "/login"), ("GET", "/api/login"), ("POST", "/api/login"), ("GET", "/api/health")}
@@ -238,7 +243,8 @@ def test_only_the_camera_reaches_the_scene(closed: House) -> None:
 
 
 def test_a_viewer_sends_no_more_where_others_may(users_file: Path, tmp_path: Path) -> None:
-    with house(tmp_path, users_file, may_send=lambda message: message != SHARE) as running:
+    hooks = Hooks(may_send=lambda message: message != SHARE)
+    with house(tmp_path, users_file, hooks=hooks) as running:
         assert reaches_the_scene(running, "otto") == [CLICK, b"\xc1", CAMERA]
         assert reaches_the_scene(running, "vera") == [CAMERA]
 
@@ -260,6 +266,52 @@ def test_signing_out_closes_the_websockets(closed: House) -> None:
                 assert client.post("/api/logout").status_code == 204
                 assert end_of(socket) == 4401
             assert client.get("/api/me").status_code == 401
+
+
+async def answer_to(app: ASGIApp, scope: Scope) -> list[dict[str, Any]]:
+    """What an app says to a websocket that asks to be opened."""
+    sent: list[dict[str, Any]] = []
+
+    async def receive() -> Message:
+        return {"type": "websocket.connect"}
+
+    async def send(message: Message) -> None:
+        sent.append({key: message[key] for key in ("type", "code")})
+
+    await app(scope, receive, send)
+    return sent
+
+
+def test_the_gate_alone_turns_foreign_websockets_away(closed: House) -> None:
+    """Whatever stands behind it: a new websocket need not think of it."""
+    sent: list[dict[str, Any]] = []
+    reached: list[Scope] = []
+
+    async def behind(scope: Scope, receive: Receive, send: Send) -> None:
+        reached.append(scope)
+
+    gate = Gate(behind, closed.access)
+    for origin in ("http://evil.example", "http://here"):
+        cookie = f"{closed.access.cookie}={closed.token('otto')}".encode()
+        headers = [(b"host", b"here"), (b"origin", origin.encode()), (b"cookie", cookie)]
+        scope: Scope = {"type": "websocket", "path": "/new", "headers": headers, "scheme": "ws"}
+        scope |= {"query_string": b"", "client": ("10.0.0.1", 1), "server": ("here", 80)}
+        sent += asyncio.run(answer_to(gate, scope))
+    assert sent == [{"type": "websocket.close", "code": 1008}]
+    (scope,) = reached
+    assert scope["state"]["person"] == Person("otto", "operator")
+
+
+def test_another_password_signs_out(tmp_path: Path, users_file: Path) -> None:
+    copy = tmp_path / "users.json"
+    copy.write_bytes(users_file.read_bytes())
+    copy.chmod(0o600)
+    with house(tmp_path, copy) as running, running.client("otto") as client:
+        with running.socket("/ws", "otto") as socket:
+            assert client.get("/api/me").status_code == 200
+            set_password(copy, "otto", "another password")
+            assert end_of(socket) == 4401
+        assert client.get("/api/me").status_code == 401
 
 
 def test_another_role_counts_at_once(tmp_path: Path, users_file: Path) -> None:
@@ -298,10 +350,12 @@ def test_without_access_the_app_asks_nobody_and_knows_nobody() -> None:
     assert app.state.access is None
     transport = httpx.ASGITransport(app=app)
 
+    scope: Scope = {"type": "websocket", "path": "/ws", "scheme": "ws", "query_string": b""}
+    scope |= {"headers": [(b"host", b"here"), (b"origin", b"http://evil.example")]}
+    assert asyncio.run(answer_to(app, scope)) == [{"code": 1008, "type": "websocket.close"}]
+
     async def ask() -> int:
         async with httpx.AsyncClient(transport=transport, base_url="http://x") as client:
             return (await client.get("/api/site")).status_code
-
-    import asyncio
 
     assert asyncio.run(ask()) == 200

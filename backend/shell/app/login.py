@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import html
 import json
 import math
@@ -26,6 +27,7 @@ NO_STORE = {"Cache-Control": "no-store"}
 def login_router(access: Access, page: Path) -> APIRouter:
     """Routes /login, /api/login, /api/logout, /api/me. page: the file of the login page."""
     router = APIRouter(tags=["access"])
+    turn = asyncio.Semaphore(1)
 
     @router.get(LOGIN_PAGE, include_in_schema=False)
     def login_page(request: Request) -> Response:
@@ -63,12 +65,13 @@ def login_router(access: Access, page: Path) -> APIRouter:
         if asked is None:
             words = "name and password are needed, as JSON or as a form"
             return JSONResponse({"detail": words}, 422, headers=NO_STORE)
-        done = await run_in_threadpool(
-            access.sign_in, asked.name, asked.password, address_of(request)
-        )
+        address = address_of(request)
+        async with turn:  # who waits here takes no thread from the other routes
+            done = await run_in_threadpool(access.sign_in, asked.name, asked.password, address)
         if done.token is None:
             return _refused(access, page, request, done, form)
-        access.sign_out(request, address_of(request))  # whoever was signed in here before
+        # Whoever was signed in here before.
+        await run_in_threadpool(access.sign_out, request, address)
         answer: Response = RedirectResponse("/", 303, headers=NO_STORE)
         if not form:
             answer = JSONResponse({"who": asked.name}, headers=NO_STORE)
