@@ -7,14 +7,20 @@ import os
 import sys
 import webbrowser
 
+from backend.shell.access.access import Access
 from backend.site.site import Site
+from cockpit.entry import Entry, link
 
 
-def announce(site: Site, port: int, host: str, open_browser: bool) -> None:
-    """Print the page's address; open it where there is a screen."""
-    shown = "127.0.0.1" if host in ("", "0.0.0.0", "::") else host
-    url = f"http://{shown}:{port}"
-    print(f"{site.title}: {url}", flush=True)
+def announce(site: Site, entry: Entry, access: Access, port: int, open_browser: bool) -> None:
+    """Print the page's address; open it where there is a screen. With one-time links it is one."""
+    url = entry.url(port)
+    if access.links is not None:
+        url = link(url, access.links.make())
+    once = " (works once)" if access.links is not None else ""
+    print(f"{site.title}: {url}{once}", flush=True)
+    for note in entry.notes():
+        print(note, flush=True)
     if not open_browser:
         return
     has_screen = sys.platform in ("darwin", "win32") or any(

@@ -165,7 +165,7 @@ def _backend(endpoint: str, site: str) -> Iterator[tuple[subprocess.Popen[str], 
     recordings = tempfile.mkdtemp()
     command = [
         *(sys.executable, "-m", "cockpit.cli", "serve", "--site", site, "--port", "0"),
-        *("--no-browser", "--listen", endpoint, "--record", recordings),
+        *("--no-browser", "--no-login", "--listen", endpoint, "--record", recordings),
     ]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     try:

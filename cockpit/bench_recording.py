@@ -22,6 +22,7 @@ from backend.shell.link.topics import match
 from backend.shell.session.recorder import NoRecorder, Recorder
 from backend.site.site import Site
 from cockpit.bench_input import cycles
+from cockpit.entry import Entry
 from cockpit.options import Options
 from cockpit.recording import make_recorder
 
@@ -36,7 +37,7 @@ def recording_rows(site: Site, config: Config, seconds: float) -> list[BenchRow]
     """
     snapshot = _snapshot(site, config)
     with tempfile.TemporaryDirectory() as folder:
-        options = Options("127.0.0.1", 0, (), (), (), "DEMO", Path(folder))
+        options = Options(Entry("127.0.0.1"), 0, (), (), (), "DEMO", Path(folder))
         recorder = make_recorder(site, config, options)
         assert isinstance(recorder, Recorder)
         without, _ = _run(NoRecorder("for comparison"), config, snapshot, seconds)

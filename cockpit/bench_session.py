@@ -87,7 +87,7 @@ def playback_rows(path: Path, seconds: float) -> list[BenchRow]:
     """The real program playing at ten times the speed, all images included, and its start."""
     command = [
         *(sys.executable, "-m", "cockpit.cli", "play", str(path), "--port", "0", "--no-browser"),
-        *("--source", "evaluated", "--speed", str(SPEED), "--from", "60"),
+        *("--no-login", "--source", "evaluated", "--speed", str(SPEED), "--from", "60"),
     ]
     began = time.perf_counter()
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)

@@ -12,6 +12,16 @@ from typing import Annotated
 import typer
 
 from backend.errors import InputError
+from cockpit.cli_entry import (
+    Cert,
+    InsecureHttp,
+    Key,
+    NoLogin,
+    OneTimeLink,
+    SelfSigned,
+    UsersFile,
+    users,
+)
 from cockpit.cli_formats import convert, export
 from cockpit.cli_playback import add_commands
 from cockpit.cli_recordings import recordings
@@ -54,13 +64,22 @@ def demo(
     no_browser: NoBrowser = False,
     no_record: NoRecord = False,
     record: Record = None,
+    users: UsersFile = None,
+    no_login: NoLogin = False,
+    cert: Cert = None,
+    key: Key = None,
+    self_signed: SelfSigned = False,
+    insecure_http: InsecureHttp = False,
 ) -> None:
     """Run a site with simulated machines, each in its own process, and open the page."""
+    from backend.control.person import SUPERVISOR, Person
+    from cockpit.entry import EntryOptions, decide
     from cockpit.run import run_demo
 
+    options = EntryOptions(users, no_login, False, cert, key, self_signed, insecure_http)
     run_demo(
         site,
-        host,
+        decide(options, host, link_for=Person("demo", SUPERVISOR)),
         port,
         open_browser=not no_browser,
         until=_interrupted(),
@@ -82,14 +101,23 @@ def serve(
     ] = "",
     no_record: NoRecord = False,
     record: Record = None,
+    users: UsersFile = None,
+    no_login: NoLogin = False,
+    one_time_link: OneTimeLink = False,
+    cert: Cert = None,
+    key: Key = None,
+    self_signed: SelfSigned = False,
+    insecure_http: InsecureHttp = False,
 ) -> None:
     """Run the cockpit on live machines, which publish to the Zenoh endpoint it listens on."""
+    from cockpit.entry import EntryOptions, decide
     from cockpit.run import run_serve
 
+    options = EntryOptions(users, no_login, one_time_link, cert, key, self_signed, insecure_http)
     own = tuple(name.strip() for name in machines.split(",") if name.strip())
     run_serve(
         site,
-        host,
+        decide(options, host),
         port,
         open_browser=not no_browser,
         listen=tuple(listen or ()),
@@ -261,6 +289,7 @@ def recover(
 
 
 app.add_typer(recordings, name="recordings")
+app.add_typer(users, name="users")
 app.command()(convert)
 app.command()(export)
 

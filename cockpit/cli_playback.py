@@ -10,6 +10,7 @@ from typing import Annotated
 import typer
 
 from backend.errors import InputError
+from cockpit.cli_entry import Cert, InsecureHttp, Key, NoLogin, SelfSigned, UsersFile
 
 Seen = Annotated[
     str | None,
@@ -44,13 +45,23 @@ def add_commands(app: typer.Typer, interrupted: Callable[[], Event]) -> None:
             float,
             typer.Option("--from", min=0.0, help="Where to begin, in seconds since its beginning."),
         ] = 0.0,
+        users: UsersFile = None,
+        no_login: NoLogin = False,
+        cert: Cert = None,
+        key: Key = None,
+        self_signed: SelfSigned = False,
+        insecure_http: InsecureHttp = False,
     ) -> None:
         """Play a recorded session in the whole cockpit. Nothing can reach a machine."""
         if source is not None and source not in SOURCES:
             raise InputError(f'--source "{source}" is unknown; allowed are {", ".join(SOURCES)}.')
+        from backend.control.person import SUPERVISOR, Person
+        from cockpit.entry import EntryOptions, decide
         from cockpit.play import run_play
 
-        run_play(path, site, host, port, not no_browser, source, speed, begin, interrupted())
+        options = EntryOptions(users, no_login, False, cert, key, self_signed, insecure_http)
+        entry = decide(options, host, link_for=Person("playback", SUPERVISOR))
+        run_play(path, site, entry, port, not no_browser, source, speed, begin, interrupted())
 
     @app.command()
     def diff(

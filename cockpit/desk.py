@@ -29,7 +29,6 @@ from backend.spatial.types import Array
 from cockpit.views.server import View
 
 MAX_HEIGHT = 50.0  # of a picked bucket tip above or below the swing joint [m]
-LOOPBACK = ("127.0.0.1", "localhost", "::1")
 _LOOPS = (("images", (SUN, EXACT), "image_hz"), ("zones", (ZONE, REGIONS), "zone_hz"))
 """Name, kinds, and which of the site's rates; each loop has a process of its own."""
 

@@ -5,13 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from cockpit.entry import Entry
+
 
 @dataclass(frozen=True)
 class Options:
     """host, port: of the page; listen, connect: Zenoh endpoints; own: machines answered for;
-    recording: whether; record: in which folder, None for the site's own."""
+    recording: whether; record: in which folder, None for the site's own; entry: who gets in."""
 
-    host: str
+    entry: Entry
     port: int
     listen: tuple[str, ...]
     connect: tuple[str, ...]

@@ -8,13 +8,14 @@ from pathlib import Path
 
 from backend.shell.session.ring import recordings_root
 from cockpit.announce import announce
+from cockpit.entry import Entry
 from cockpit.playback import Options, PlaybackStation, newest, see
 
 
 def run_play(
     path: Path | None,
     site_name: str | None,
-    host: str,
+    entry: Entry,
     port: int,
     open_browser: bool,
     source: str | None,
@@ -24,9 +25,9 @@ def run_play(
 ) -> None:
     """A recorded session, until interrupted. path: None for what was recorded last."""
     seen = see(path or newest(recordings_root()), site_name)
-    station = PlaybackStation(seen, Options(host, port, source, speed, begin))
+    station = PlaybackStation(seen, Options(entry, port, source, speed, begin))
     with contextlib.closing(station):
-        announce(seen.site, station.web.port, host, open_browser)
+        announce(seen.site, entry, station.access, station.web.port, open_browser)
         minutes, seconds = divmod((seen.session.end - seen.session.begin) / 1e9, 60.0)
         print(f"PLAYBACK of {seen.session.path}: {minutes:.0f} min {seconds:.0f} s.", flush=True)
         for problem in station.session()["problems"]:

@@ -36,7 +36,8 @@ from backend.shell.session.player import MODE, Player
 from backend.shell.session.reader import Session, open_session
 from backend.shell.session.ring import parts_of, pins_of, recordings_of
 from backend.site.site import Site, load_site, parse_site, shipped_sites
-from cockpit.desk import LOOPBACK, Desk, image_loops, load_models, make_config
+from cockpit.desk import Desk, image_loops, load_models, make_config
+from cockpit.entry import Entry
 from cockpit.foreign import as_session
 from cockpit.resolutions import resolutions
 from cockpit.session_document import session_document
@@ -110,11 +111,11 @@ def recorded_site(session: Session) -> Site:
 
 @dataclass(frozen=True)
 class Options:
-    """host, port: of the page; source: None for the first that the session has; speed, begin [s]:
-    playback starts so; playing: whether it starts by itself.
+    """entry, port: who gets to the page, and where it is; source: None for the first that
+    the session has; speed, begin [s]: playback starts so; playing: whether it starts by itself.
     """
 
-    host: str
+    entry: Entry
     port: int
     source: str | None = None
     speed: float = 1.0
@@ -127,7 +128,7 @@ class PlaybackStation:
 
     def __init__(self, seen: Seen, options: Options) -> None:
         self._closing = contextlib.ExitStack()
-        listener = bind(options.host, options.port)
+        listener = bind(options.entry.host, options.port)
         self._closing.callback(listener.close)
         try:
             self._build(seen, options, listener)
@@ -168,17 +169,21 @@ class PlaybackStation:
             on_message=self._on_message,
             what_if=self.desk.what_if,
         )
+        self.access = access = options.entry.access(listener.getsockname()[1])
+        self._closing.callback(access.close)
+        hooks = Hooks(
+            allow=lambda connection: access.identify(connection) is not None,
+            opened=self.view.attach,
+            closed=self.view.detach,
+        )
         app = create_app(
             sources,
-            viewer_router(
-                lambda: self.view.port,
-                Hooks(opened=self.view.attach, closed=self.view.detach),
-                HEAD,
-            ),
-            hosts=LOOPBACK if options.host in LOOPBACK else ("*",),
+            viewer_router(lambda: self.view.port, hooks, HEAD),
+            hosts=options.entry.hosts,
             routers=(session_router(self),),
+            access=access,
         )
-        self.web = WebServer(app, listener)
+        self.web = WebServer(app, listener, options.entry.tls)
         self.player.start()
         self._closing.callback(self.player.stop)
         self._begin(options)

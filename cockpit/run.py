@@ -17,6 +17,7 @@ from backend.shell.link.session import with_port
 from backend.shell.priority import FIRST, set_niceness
 from backend.site.site import Site, load_site
 from cockpit.announce import announce
+from cockpit.entry import Entry
 
 LOOPBACK = "tcp/127.0.0.1:0"
 LIVE = "tcp/127.0.0.1:7447"
@@ -26,7 +27,7 @@ SETTLE = 6.0
 
 def run_demo(
     site_name: str,
-    host: str,
+    entry: Entry,
     port: int,
     open_browser: bool,
     until: threading.Event,
@@ -43,13 +44,13 @@ def run_demo(
     began = [float("inf")]
     station = Station(
         site,
-        Options(host, port, (endpoint,), (), (), "DEMO", record, recording),
+        Options(entry, port, (endpoint,), (), (), "DEMO", record, recording),
         demo_began=(lambda: began[0]) if tells_a_story(site) else None,
     )
     with contextlib.closing(station):
         began[0] = time.time() + SETTLE
         with _machines(site_name, site, endpoint, began[0]) as processes:
-            announce(site, station.web.port, host, open_browser)
+            announce(site, entry, station.access, station.web.port, open_browser)
             print(f"Simulated machines talk to {endpoint}.", flush=True)
             gone: set[str] = set()
             while not until.wait(0.5):
@@ -71,7 +72,7 @@ def tells_a_story(site: Site) -> bool:
 
 def run_serve(
     site_name: str,
-    host: str,
+    entry: Entry,
     port: int,
     open_browser: bool,
     listen: tuple[str, ...],
@@ -90,9 +91,9 @@ def run_serve(
     listen = listen or site.link.listen or (() if connect or site.link.connect else (LIVE,))
     listen = tuple(with_port(endpoint) for endpoint in listen)
     connect = connect or site.link.connect
-    station = Station(site, Options(host, port, listen, connect, own, "LIVE", record, recording))
+    station = Station(site, Options(entry, port, listen, connect, own, "LIVE", record, recording))
     with contextlib.closing(station):
-        announce(site, station.web.port, host, open_browser)
+        announce(site, entry, station.access, station.web.port, open_browser)
         where = [f"listening on {e}" for e in listen] + [f"connected to {e}" for e in connect]
         print(f"Machines: {', '.join(where)}.", flush=True)
         until.wait()

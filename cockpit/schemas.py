@@ -6,6 +6,13 @@ import json
 
 from pydantic import BaseModel
 
+from backend.documents.access import (
+    AuditEntry,
+    EntranceDocument,
+    MeDocument,
+    UsersDocument,
+    UsersFileDocument,
+)
 from backend.documents.alarms import AlarmsDocument
 from backend.documents.assessment import AssessmentDocument
 from backend.documents.bench import BenchDocument
@@ -36,6 +43,11 @@ SCHEMAS: dict[str, tuple[type[BaseModel], str]] = {
     "series": (SeriesDocument, "/api/session/series"),
     "diff": (DiffDocument, "what diff --json prints, and /api/session/diff"),
     "alarms": (AlarmsDocument, "/api/alarms; its entries are the lines of alarms.jsonl"),
+    "users": (UsersDocument, "what users list --json prints"),
+    "users-file": (UsersFileDocument, "the users file"),
+    "me": (MeDocument, "/api/me"),
+    "entrance": (EntranceDocument, "GET /api/login"),
+    "audit": (AuditEntry, "one line of the audit log"),
     "site-file": (SiteTable, "a site file, as TOML"),
 }
 

@@ -29,7 +29,7 @@ from backend.shell.link.source import LinkSource
 from backend.shell.runner import Runner
 from backend.shell.session.recorder import Recorder
 from backend.site.site import Site
-from cockpit.desk import LOOPBACK, Desk, image_loops, load_models, make_config
+from cockpit.desk import Desk, image_loops, load_models, make_config
 from cockpit.driving import make_driving
 from cockpit.options import Options
 from cockpit.recording import make_recorder, recording_sources, site_folder
@@ -49,7 +49,7 @@ class Station:
         options: Options,
         demo_began: Callable[[], float] | None = None,
     ) -> None:
-        listener = bind(options.host, options.port)
+        listener = bind(options.entry.host, options.port)
         self._closing = contextlib.ExitStack()
         self._closing.callback(listener.close)
         try:
@@ -111,14 +111,20 @@ class Station:
             seats=self.driving,
             alarms=self.alarm_log.document,
         )
-        hooks = Hooks(opened=self.view.attach, closed=self.view.detach)
-        loopback = options.host in LOOPBACK
+        self.access = access = options.entry.access(listener.getsockname()[1])
+        self._closing.callback(access.close)
+        hooks = Hooks(
+            allow=lambda connection: access.identify(connection) is not None,
+            opened=self.view.attach,
+            closed=self.view.detach,
+        )
         app = create_app(
             sources,
             viewer_router(lambda: self.view.port, hooks, HEAD),
-            hosts=LOOPBACK if loopback else ("*",),
+            hosts=options.entry.hosts,
+            access=access,
         )
-        self.web = WebServer(app, listener)
+        self.web = WebServer(app, listener, options.entry.tls)
         self.recorder.start()
         self.alarm_log.start()
         self._closing.callback(self.recorder.close)
@@ -182,8 +188,9 @@ class Station:
         return self.recorder.notices() + self.alarm_log.notices()
 
     def _event(self, what: str, who: str, details: dict[str, Any]) -> None:
-        """What an operator did with a machine, for the recording."""
+        """What an operator did with a machine, for the recording and the audit log."""
         self.recorder.action(what, None, {"who": who, **details})
+        self.access.audit(what, who, details)
 
     def _on_message(self, message: dict[str, Any], person: Person | None) -> None:
         """What a page asks of the recording, of alarms, or of the scene and the images."""

@@ -26,10 +26,15 @@ settings.load_profile("cockpit")
 # Before any program under test starts: none may record into the home of who runs the tests.
 RECORDINGS = tempfile.mkdtemp(prefix="cockpit-recordings-")
 os.environ["EXCAVATOR_COCKPIT_RECORDINGS"] = RECORDINGS
+# Nor may any see the users of who runs the tests, or write into their audit log.
+HOME = tempfile.mkdtemp(prefix="cockpit-home-")
+os.environ["XDG_CONFIG_HOME"] = str(Path(HOME) / "config")
+os.environ["XDG_STATE_HOME"] = str(Path(HOME) / "state")
 
 
 def pytest_sessionfinish() -> None:
     shutil.rmtree(RECORDINGS, ignore_errors=True)
+    shutil.rmtree(HOME, ignore_errors=True)
 
 
 @pytest.fixture(scope="session")

@@ -21,6 +21,7 @@ from websockets.sync.client import ClientConnection, connect
 from backend.shell.app.wire import decode
 from backend.shell.link.session import with_port
 
+LOCAL = ("--no-login",)  # signing in has tests of its own
 ENVIRONMENT = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
 
 
@@ -95,14 +96,22 @@ def listen(process: subprocess.Popen[str], word: str) -> tuple[list[str], thread
 
 
 @contextlib.contextmanager
-def backend(command: str, *arguments: str, endpoint: str | None = None) -> Iterator[Backend]:
-    """`cockpit COMMAND ...` on a free port, once it says where its page is."""
-    process = start(command, "--port", "0", "--no-browser", *arguments)
+def backend(
+    command: str,
+    *arguments: str,
+    endpoint: str | None = None,
+    login: tuple[str, ...] = LOCAL,
+) -> Iterator[Backend]:
+    """`cockpit COMMAND ...` on a free port, once it says where its page is.
+
+    login: the options that say how one gets in.
+    """
+    process = start(command, "--port", "0", "--no-browser", *login, *arguments)
     output, ready = listen(process, "tcp/")
     try:
         assert ready.wait(60.0), f"no start within 60 s: {output}"
         text = "\n".join(output)
-        page, zenoh = re.search(r"http://\S+:\d+", text), re.search(r"tcp/[\d.]+:\d+", text)
+        page, zenoh = re.search(r"https?://\S+:\d+", text), re.search(r"tcp/[\d.]+:\d+", text)
         assert page, f"did not start: {text}"
         yield Backend(process, page[0], endpoint or (zenoh[0] if zenoh else ""), output)
     finally:
@@ -147,9 +156,9 @@ def frames(socket: ClientConnection, seconds: float) -> Iterator[tuple[float, di
 
 
 @contextlib.contextmanager
-def playback(path: Path, *options: str) -> Iterator[Backend]:
+def playback(path: Path, *options: str, login: tuple[str, ...] = LOCAL) -> Iterator[Backend]:
     """`cockpit play PATH`, once its page is up."""
-    process = start("play", str(path), "--port", "0", "--no-browser", *options)
+    process = start("play", str(path), "--port", "0", "--no-browser", *login, *options)
     output, ready = listen(process, "PLAYBACK")
     try:
         assert ready.wait(90.0), output

@@ -122,7 +122,13 @@ def test_every_import_is_a_declared_dependency(repository: Path) -> None:
     import tomllib
 
     project = tomllib.loads((repository / "pyproject.toml").read_text())["project"]
-    aliases = {"eclipse-zenoh": "zenoh", "python-can": "can", "python-fcl": "fcl", "pyyaml": "yaml"}
+    aliases = {
+        "argon2-cffi": "argon2",
+        "eclipse-zenoh": "zenoh",
+        "python-can": "can",
+        "python-fcl": "fcl",
+        "pyyaml": "yaml",
+    }
     declared = {aliases.get(name, name).replace("-", "_") for name in project["dependencies"]}
     for path in sources():
         for name in imports_of(path):

@@ -9,6 +9,7 @@ import * as hover from "./hover.js";
 import * as alarm from "./alarm.js";
 import * as topbar from "./topbar.js";
 import * as demo from "./demo.js";
+import { leaveIfSignedOut } from "./signed_out.js";
 import { startSound, toggleSound } from "./sound.js";
 import * as ghost from "./ghost.js";
 import * as tip from "./tip.js";
@@ -123,6 +124,7 @@ const scheme = location.protocol === "https:" ? "wss:" : "ws:";
 const socket = connect(`${scheme}//${location.host}/ws`, onFrame, (word) => {
   state.socket = word;
   if (word === "open") session.reconnected();
+  if (word === "closed") leaveIfSignedOut();
 });
 tip.startTip(socket.send);
 ghost.startGhost(socket.send, redraw);

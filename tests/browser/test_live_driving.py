@@ -72,7 +72,9 @@ class Pad:
         if self.state() in ("", "Reserved"):
             self.page.keyboard.press("r")
             self.wait(lambda: self.state() not in ("", "Reserved"))
+        end = time.monotonic() + 60.0
         while self.state() not in ("Enabled", "Active"):
+            assert time.monotonic() < end, json.dumps(self.watched.snapshot()["driving"])[:1500]
             self.rest()
             self.dead_man(False)
             time.sleep(0.3)
@@ -105,16 +107,18 @@ class Pad:
 
 @pytest.fixture(scope="module")
 def station() -> Iterator[Backend]:
-    with serve("demo", "--no-record") as running:
-        with simulated("demo", running.endpoint, "left", "right"):
-            running.wait_for(all_valid)
-            yield running
+    with (
+        serve("demo", "--no-record") as running,
+        simulated("demo", running.endpoint, "left", "right"),
+    ):
+        running.wait_for(all_valid)
+        yield running
 
 
 def test_dig_swing_and_dump_by_stick_while_the_other_works(
     browser: Browser, station: Backend, artifacts: Path
 ) -> None:
-    pad = Pad(browser, station.url, SIZES[0])
+    pad = Pad(browser, station.url, SIZES[1])
     pad.arm()
     start = pad.joints()
     right = station.get("/api/snapshot")["machines"]["right"]["joints"]
@@ -126,7 +130,7 @@ def test_dig_swing_and_dump_by_stick_while_the_other_works(
         after = pad.joints()
         travelled += sum(abs(after[role] - before[role]) for role in after)
         if name == "swing":
-            pad.page.screenshot(path=artifacts / "driving-live-1920x1080.png")
+            pad.page.screenshot(path=artifacts / "driving-live-1366x768.png")
     assert travelled > 2.0
     document = station.get("/api/snapshot")
     machines = document["driving"]["machines"]

@@ -217,10 +217,10 @@ def test_a_taken_port_is_said_in_one_sentence() -> None:
 @pytest.mark.parametrize(
     ("arguments", "word"),
     [
-        (["serve", "--site", "nowhere"], "nowhere"),
-        (["serve", "--site", "demo", "--machines", "middle"], "middle"),
-        (["serve", "--site", "demo", "--listen", "tcp/nonsense"], "tcp/nonsense"),
-        (["serve", "--site", "demo", "--port", "99999"], "99999"),
+        (["serve", "--no-login", "--site", "nowhere"], "nowhere"),
+        (["serve", "--no-login", "--site", "demo", "--machines", "middle"], "middle"),
+        (["serve", "--no-login", "--site", "demo", "--listen", "tcp/nonsense"], "tcp/nonsense"),
+        (["serve", "--no-login", "--site", "demo", "--port", "99999"], "99999"),
         (["sim", "--site", "demo", "--machine", "middle"], "middle"),
         (["schema", "nothing"], "nothing"),
         (["demo", "--site", "nowhere"], "nowhere"),

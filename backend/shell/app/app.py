@@ -6,13 +6,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-from urllib.parse import urlsplit
 
 from fastapi import APIRouter, FastAPI, Request, Response, WebSocket
 from fastapi.responses import FileResponse, JSONResponse
 from fastapi.staticfiles import StaticFiles
 from fastapi_offline import FastAPIOffline
-from starlette.middleware.base import RequestResponseEndpoint
 from starlette.middleware.trustedhost import TrustedHostMiddleware
 
 from backend.control.person import SUPERVISOR, Person
@@ -20,7 +18,10 @@ from backend.documents.alarms import AlarmsDocument
 from backend.errors import InputError
 from backend.fusion.pose import Validity
 from backend.pipeline.records import Snapshot
+from backend.shell.access.access import Access
 from backend.shell.app.feed import Feed, Frames, OnMessage, Seats
+from backend.shell.app.gate import Gate, from_here
+from backend.shell.app.login import login_router
 from backend.shell.app.models import (
     HealthModel,
     MachineDescriptionModel,
@@ -30,15 +31,10 @@ from backend.shell.app.models import (
     WhatIfRequest,
 )
 from backend.shell.app.recording import RecordingSources, recording_router
+from backend.shell.app.security import SecurityHeaders
 from backend.shell.app.wire import dumps
 
 STATIC = Path(__file__).resolve().parents[3] / "static"
-
-PAGE_POLICY = (
-    "default-src 'self'; img-src 'self' data: blob:; style-src 'self'; script-src 'self'; "
-    "connect-src 'self'; frame-src 'self'; frame-ancestors 'self'; base-uri 'none'; "
-    "form-action 'self'"
-)
 
 
 LOCAL = Person("local", SUPERVISOR)
@@ -70,11 +66,14 @@ def create_app(
     viewer: APIRouter | None = None,
     hosts: tuple[str, ...] = ("*",),
     routers: tuple[APIRouter, ...] = (),
+    access: Access | None = None,
 ) -> FastAPI:
     """The application. viewer: routes of the 3D view, served below /view; routers: more routes.
 
     hosts: names under which it answers. A page that binds to the loopback answers to no other
     name, so that a foreign name that resolves to the loopback leads nowhere.
+    access: who may do what; every websocket and request that passes it has `state.person`. Without
+    it nobody is asked and nobody is known: state.person is None.
     """
     app: FastAPI = FastAPIOffline(  # its documentation page needs no network
         title="Excavator cockpit",
@@ -85,19 +84,14 @@ def create_app(
         openapi_url="/api/openapi.json",
         redoc_url=None,
     )
+    # The last one added is asked first.
+    if access is not None:
+        app.add_middleware(Gate, access=access)
     app.add_middleware(TrustedHostMiddleware, allowed_hosts=list(hosts))
+    app.add_middleware(SecurityHeaders, https=access is not None and access.https)
+    app.state.access = access
     feed = Feed(sources.frames, sources.site, sources.on_message, sources.seats)
     hub = sources.frames.hub
-
-    @app.middleware("http")
-    async def headers(request: Request, call_next: RequestResponseEndpoint) -> Response:
-        response = await call_next(request)
-        response.headers["X-Content-Type-Options"] = "nosniff"
-        response.headers["Referrer-Policy"] = "no-referrer"
-        if request.url.path == "/" or request.url.path.startswith("/static"):
-            response.headers["Content-Security-Policy"] = PAGE_POLICY
-            response.headers["Cache-Control"] = "no-cache"
-        return response
 
     @app.get("/", include_in_schema=False)
     async def page() -> FileResponse:
@@ -108,10 +102,16 @@ def create_app(
         return Response(status_code=204)
 
     @app.get("/api/health", responses={200: {"model": HealthModel}}, tags=["state"])
-    async def health() -> Response:
-        """Whether the backend and every machine are well, and what is wrong in words."""
+    async def health(request: Request) -> Response:
+        """Whether the backend and every machine are well, and what is wrong in words.
+
+        Without a session: `ok` and `status` only.
+        """
         newest = hub.latest()
-        return _json(_health(newest, sources))
+        found = _health(newest, sources)
+        if access is not None and request.state.person is None:
+            found = {"ok": found["ok"], "status": found["status"]}
+        return _json(found)
 
     @app.get("/api/site", responses={200: {"model": SiteModel}}, tags=["description"])
     async def site() -> Response:
@@ -152,28 +152,21 @@ def create_app(
 
     @app.websocket("/ws")
     async def socket(websocket: WebSocket) -> None:
-        if not same_origin(websocket):
+        if not from_here(websocket):
             await websocket.close(code=1008)
             return
+        person = LOCAL if access is None else websocket.scope["state"]["person"]
         await websocket.accept()
-        await feed.serve(websocket, getattr(websocket.state, "person", LOCAL))
+        await feed.serve(websocket, person)
 
+    if access is not None:
+        app.include_router(login_router(access, STATIC / "login.html"))
     if sources.recording is not None:
         app.include_router(recording_router(sources.recording))
     for router in (*routers, *((viewer,) if viewer is not None else ())):
         app.include_router(router)
     app.mount("/static", StaticFiles(directory=STATIC), name="static")
     return app
-
-
-def same_origin(websocket: WebSocket) -> bool:
-    """Whether the page that opens this websocket came from this server.
-
-    Browsers always send Origin; middleware for cross-site requests does not run on websockets.
-    Programs without a browser send none and are let in.
-    """
-    origin = websocket.headers.get("origin")
-    return origin is None or urlsplit(origin).netloc == websocket.headers.get("host")
 
 
 def _health(newest: Snapshot | None, sources: Sources) -> dict[str, Any]:

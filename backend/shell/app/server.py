@@ -10,6 +10,7 @@ import uvicorn
 from fastapi import FastAPI
 
 from backend.errors import InputError
+from backend.shell.access.certificates import Tls
 
 
 def bind(host: str, port: int) -> socket.socket:
@@ -36,9 +37,9 @@ def bind(host: str, port: int) -> socket.socket:
 
 
 class WebServer:
-    """Serves an app until stopped."""
+    """Serves an app until stopped. tls: over HTTPS with this certificate; None: plain HTTP."""
 
-    def __init__(self, app: FastAPI, listener: socket.socket) -> None:
+    def __init__(self, app: FastAPI, listener: socket.socket, tls: Tls | None = None) -> None:
         self._listener = listener
         config = uvicorn.Config(
             app,
@@ -50,6 +51,10 @@ class WebServer:
             ws_per_message_deflate=False,
             timeout_graceful_shutdown=1,
             server_header=False,
+            # Limits on logins count by address: what a header says of it is not believed.
+            proxy_headers=False,
+            ssl_certfile=None if tls is None else tls.cert,
+            ssl_keyfile=None if tls is None else str(tls.key),
         )
         self._server = uvicorn.Server(config)
         self._thread = threading.Thread(target=self._run, name="web", daemon=True)

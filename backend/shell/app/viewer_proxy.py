@@ -2,8 +2,9 @@
 
 The scene's server listens on the loopback only and knows neither logins nor origins. Here every
 request passes `allow` first, a websocket also needs an Origin of the same host, and what a browser
-sends is filtered. A browser window that wants to be told apart uses /view/{page}/ with a token of
-its own; the client then opens its websocket at /view/{page}.
+sends is filtered: whoever may only look sends where the camera is, whatever others may send.
+A browser window that wants to be told apart uses /view/{page}/ with a token of its own; the client
+then opens its websocket at /view/{page}.
 """
 
 from __future__ import annotations
@@ -24,6 +25,8 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, InvalidHandshake
 from websockets.typing import Subprotocol
 
+from backend.control.person import Person
+
 PAGE_TOKEN = re.compile(r"[A-Za-z0-9_-]{1,64}")
 PROTOCOL = re.compile(r"viser-v[0-9A-Za-z.+-]{1,32}")
 LONGEST = 64 * 1024  # [bytes] of a message from a browser
@@ -36,6 +39,12 @@ POLICY = (
     "font-src data:; connect-src 'self' data: blob:; frame-ancestors 'self'; base-uri 'none'; "
     "form-action 'none'"
 )
+
+
+def only_looks(connection: HTTPConnection) -> bool:
+    """Whether who is there is signed in as a viewer."""
+    person = getattr(connection.state, "person", None)
+    return isinstance(person, Person) and not person.may_drive
 
 
 def views_only(message: bytes) -> bool:
@@ -64,7 +73,8 @@ class Hooks:
     """What the proxy asks and tells.
 
     allow: may this request or websocket see the scene; may_send: may this message of a browser
-    pass; opened, closed: page token and the local TCP port of its connection to the scene's server.
+    pass, a viewer's only if it is of `VIEWING`, too; opened, closed: page token and the local TCP
+    port of its connection to the scene's server.
     """
 
     allow: Callable[[HTTPConnection], bool] = _anyone
@@ -126,7 +136,7 @@ def viewer_router(port: Callable[[], int], hooks: Hooks, head: str = "") -> APIR
         hooks.opened(page, local_port)
         try:
             await websocket.accept(subprotocol=protocol)
-            await _relay(websocket, connection, hooks)
+            await _relay(websocket, connection, _filter(websocket, hooks))
         finally:
             hooks.closed(page, local_port)
             await connection.close()
@@ -166,11 +176,19 @@ async def _fetch(port: int, head: str) -> bytes:
     return answer.content.replace(b"<head>", b"<head>" + head.encode(), 1)
 
 
-async def _relay(websocket: WebSocket, connection: ClientConnection, hooks: Hooks) -> None:
+def _filter(websocket: WebSocket, hooks: Hooks) -> Callable[[bytes], bool]:
+    if only_looks(websocket):
+        return lambda message: views_only(message) and hooks.may_send(message)
+    return hooks.may_send
+
+
+async def _relay(
+    websocket: WebSocket, connection: ClientConnection, may_send: Callable[[bytes], bool]
+) -> None:
     """Both ways until one side ends."""
     ways = [
         asyncio.create_task(_to_browser(websocket, connection)),
-        asyncio.create_task(_from_browser(websocket, connection, hooks.may_send)),
+        asyncio.create_task(_from_browser(websocket, connection, may_send)),
     ]
     try:
         await asyncio.wait(ways, return_when=asyncio.FIRST_COMPLETED)
