@@ -29,8 +29,9 @@ from cockpit.desk import LOOPBACK, Desk, image_loops, load_models, make_config
 from cockpit.options import Options
 from cockpit.recording import make_recorder, recording_sources
 from cockpit.resolutions import resolutions
+from cockpit.views.client_head import HEAD
 from cockpit.views.inputs import scene_site
-from cockpit.views.server import HEAD, View, start
+from cockpit.views.server import View, start
 
 
 class Station:

@@ -22,12 +22,15 @@ from fastapi import FastAPI
 from PIL import Image
 from playwright.sync_api import Browser
 from starlette.requests import HTTPConnection
+from starlette.testclient import TestClient
+from starlette.websockets import WebSocketDisconnect
 from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosed, InvalidHandshake
 
 from backend.fusion.pose import Validity
 from backend.shell.app.viewer_proxy import Hooks, viewer_router, views_only
-from cockpit.views.server import HEAD, View, start
+from cockpit.views.client_head import HEAD
+from cockpit.views.server import View, start
 
 PROTOCOL = f"viser-v{viser.__version__}"
 
@@ -253,3 +256,19 @@ def test_a_browser_draws_the_scene(front: Front, browser: Browser, artifacts: Pa
     finally:
         stop.set()
         feeding.join()
+
+
+def test_while_the_scene_starts_a_page_stands_there_that_asks_again() -> None:
+    app = FastAPI()
+    app.include_router(viewer_router(lambda: None, Hooks(), HEAD))
+    client = TestClient(app)
+    answer = client.get("/view/abc/?darkMode")
+    assert answer.status_code == 202
+    assert 'http-equiv="refresh"' in answer.text
+    assert answer.headers["cache-control"] == "no-store"
+    headers = {"origin": "http://testserver", "host": "testserver"}
+    with (
+        pytest.raises(WebSocketDisconnect),
+        client.websocket_connect("/view/abc", [PROTOCOL], headers=headers),
+    ):
+        pass

@@ -15,7 +15,6 @@ from typing import Any
 from fastapi import WebSocket, WebSocketDisconnect
 
 from backend.pipeline.records import Snapshot
-from backend.shell.app.image_frames import frame_of
 from backend.shell.app.wire import encode
 from backend.shell.hub import Hub
 
@@ -46,6 +45,10 @@ class Frames:
     def images(self) -> dict[tuple[str, str], tuple[float, bytes]]:
         """(state_time, frame) of every image, by kind and key."""
         images = self.hub.images()
+        if not images:
+            return {}
+        from backend.shell.app.image_frames import frame_of  # loaded with the images' own modules
+
         for key, image in images.items():
             known = self._images.get(key)
             if known is not None and known[0] == image.state_time:
