@@ -13,6 +13,7 @@ import typer
 
 from backend.errors import InputError
 from cockpit.cli_formats import convert, export
+from cockpit.cli_keys import LinkConfig, keys
 from cockpit.cli_playback import add_commands
 from cockpit.cli_recordings import recordings
 
@@ -82,6 +83,7 @@ def serve(
     ] = "",
     no_record: NoRecord = False,
     record: Record = None,
+    link_config: LinkConfig = None,
 ) -> None:
     """Run the cockpit on live machines, which publish to the Zenoh endpoint it listens on."""
     from cockpit.run import run_serve
@@ -98,6 +100,7 @@ def serve(
         until=_interrupted(),
         recording=not no_record,
         record=record,
+        link_config=link_config,
     )
 
 
@@ -109,11 +112,12 @@ def sim(
     start_at: Annotated[
         float | None, typer.Option(help="Epoch second at which the machine's program begins.")
     ] = None,
+    link_config: LinkConfig = None,
 ) -> None:
     """Simulate one machine: publish as its hardware does and obey velocity commands."""
     from cockpit.run import run_sim
 
-    run_sim(site, machine, tuple(connect or ()), start_at, until=_interrupted())
+    run_sim(site, machine, tuple(connect or ()), start_at, _interrupted(), link_config)
 
 
 @app.command()
@@ -130,12 +134,13 @@ def agent(
     dbc: Annotated[
         Path | None, typer.Option(help="CAN frames; scenes/can/agent.dbc unless told otherwise.")
     ] = None,
+    link_config: LinkConfig = None,
 ) -> None:
     """Run a machine's own agent: it grants the lease, obeys its holder and enforces limits."""
     from cockpit.run import run_agent
 
     can = (interface, channel, bitrate, dbc)
-    run_agent(site, machine, driver, can, tuple(connect or ()), until=_interrupted())
+    run_agent(site, machine, driver, can, tuple(connect or ()), _interrupted(), link_config)
 
 
 @app.command()
@@ -261,6 +266,7 @@ def recover(
 
 
 app.add_typer(recordings, name="recordings")
+app.command()(keys)
 app.command()(convert)
 app.command()(export)
 

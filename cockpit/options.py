@@ -9,7 +9,8 @@ from pathlib import Path
 @dataclass(frozen=True)
 class Options:
     """host, port: of the page; listen, connect: Zenoh endpoints; own: machines answered for;
-    recording: whether; record: in which folder, None for the site's own."""
+    recording: whether; record: in which folder, None for the site's own; link_config: a Zenoh
+    configuration file."""
 
     host: str
     port: int
@@ -19,3 +20,4 @@ class Options:
     mode: str
     record: Path | None = None
     recording: bool = True
+    link_config: Path | None = None

@@ -78,19 +78,25 @@ def run_serve(
     until: threading.Event,
     recording: bool = True,
     record: Path | None = None,
+    link_config: Path | None = None,
 ) -> None:
-    """The cockpit on live machines, until interrupted."""
+    """The cockpit on live machines, until interrupted. link_config: a Zenoh configuration file."""
     from cockpit.options import Options
     from cockpit.station import Station
 
     site = load_site(site_name)
-    listen = listen or site.link.listen or (() if connect or site.link.connect else (LIVE,))
+    listen = listen or site.link.listen
+    if not (listen or connect or site.link.connect or link_config):
+        listen = (LIVE,)
     listen = tuple(with_port(endpoint) for endpoint in listen)
     connect = connect or site.link.connect
-    station = Station(site, Options(host, port, listen, connect, own, "LIVE", record, recording))
+    station = Station(
+        site, Options(host, port, listen, connect, own, "LIVE", record, recording, link_config)
+    )
     with contextlib.closing(station):
         announce(site, station.web.port, host, open_browser)
         where = [f"listening on {e}" for e in listen] + [f"connected to {e}" for e in connect]
+        where = where or [f"as {link_config} says"]
         print(f"Machines: {', '.join(where)}.", flush=True)
         until.wait()
 
@@ -101,13 +107,14 @@ def run_sim(
     connect: tuple[str, ...],
     start_at: float | None,
     until: threading.Event,
+    link_config: Path | None = None,
 ) -> None:
     """One simulated machine, until interrupted."""
     from backend.shell.sim.process import run
 
     site = load_site(site_name)
     site.machine(machine)
-    run(site, machine, connect or (LIVE,), start_at, until)
+    run(site, machine, _partners(connect, link_config), start_at, until, link_config=link_config)
 
 
 def run_agent(
@@ -117,6 +124,7 @@ def run_agent(
     can: tuple[str, str, int, Path | None],
     connect: tuple[str, ...],
     until: threading.Event,
+    link_config: Path | None = None,
 ) -> None:
     """One machine's agent, until interrupted. can: interface, channel, bit rate, DBC file."""
     from backend.shell.agent.drivers.driver import Driver
@@ -136,7 +144,12 @@ def run_agent(
 
     site = load_site(site_name)
     site.machine(machine)
-    run(site, machine, connect or (LIVE,), until, make)
+    run(site, machine, _partners(connect, link_config), until, make, link_config)
+
+
+def _partners(connect: tuple[str, ...], link_config: Path | None) -> tuple[str, ...]:
+    """Endpoints to connect to; none where the configuration says it."""
+    return connect or (() if link_config else (LIVE,))
 
 
 @contextlib.contextmanager

@@ -66,7 +66,7 @@ class Station:
         self._demo_began = demo_began
         self.hub = Hub()
         self.document = OncePerSnapshot(self._document)
-        session = open_session(options.listen, options.connect, mode="router")
+        session = open_session(options.listen, options.connect, "router", options.link_config)
         self._closing.callback(session.close)
         prefixes = {machine.prefix: machine.name for machine in site.machines}
         self.recorder = make_recorder(site, self.config, options)
