@@ -113,7 +113,8 @@ def _look(path: Path, endpoint: str, context: ssl.SSLContext, host: str, port: i
         alert = re.search(r"alert ([a-z ]+)", str(error))
         if alert is not None:
             raise InputError(
-                f"{path}: {endpoint} does not accept connect_certificate: {alert[1].strip()}."
+                f"{path}: {endpoint} does not accept connect_certificate ({alert[1].strip()}); "
+                "did the same authority sign it, and is it still valid there?"
             ) from None
     except OSError:
         return  # not there, or silent: it has not refused
