@@ -16,6 +16,7 @@ from cockpit.cli_formats import convert, export
 from cockpit.cli_keys import LinkConfig, keys
 from cockpit.cli_playback import add_commands
 from cockpit.cli_recordings import recordings
+from cockpit.logs import LogJson, LogLevel
 
 app = typer.Typer(
     name="cockpit",
@@ -45,6 +46,10 @@ Record = Annotated[
     Path | None,
     typer.Option(help="Folder of all recordings; default: the site file's, or the user's state."),
 ]
+MetricsTokenFile = Annotated[
+    Path | None,
+    typer.Option(help="File (0600) with the bearer token for GET /metrics; without it, 404."),
+]
 
 
 @app.command()
@@ -55,6 +60,8 @@ def demo(
     no_browser: NoBrowser = False,
     no_record: NoRecord = False,
     record: Record = None,
+    log_json: LogJson = False,
+    log_level: LogLevel = None,
 ) -> None:
     """Run a site with simulated machines, each in its own process, and open the page."""
     from cockpit.run import run_demo
@@ -84,8 +91,12 @@ def serve(
     no_record: NoRecord = False,
     record: Record = None,
     link_config: LinkConfig = None,
+    metrics_token_file: MetricsTokenFile = None,
+    log_json: LogJson = False,
+    log_level: LogLevel = None,
 ) -> None:
     """Run the cockpit on live machines, which publish to the Zenoh endpoint it listens on."""
+    from backend.shell.app.metrics import read_token
     from cockpit.run import run_serve
 
     own = tuple(name.strip() for name in machines.split(",") if name.strip())
@@ -101,6 +112,7 @@ def serve(
         recording=not no_record,
         record=record,
         link_config=link_config,
+        metrics_token="" if metrics_token_file is None else read_token(metrics_token_file),
     )
 
 
@@ -113,6 +125,8 @@ def sim(
         float | None, typer.Option(help="Epoch second at which the machine's program begins.")
     ] = None,
     link_config: LinkConfig = None,
+    log_json: LogJson = False,
+    log_level: LogLevel = None,
 ) -> None:
     """Simulate one machine: publish as its hardware does and obey velocity commands."""
     from cockpit.run import run_sim
@@ -135,6 +149,8 @@ def agent(
         Path | None, typer.Option(help="CAN frames; scenes/can/agent.dbc unless told otherwise.")
     ] = None,
     link_config: LinkConfig = None,
+    log_json: LogJson = False,
+    log_level: LogLevel = None,
 ) -> None:
     """Run a machine's own agent: it grants the lease, obeys its holder and enforces limits."""
     from cockpit.run import run_agent

@@ -39,7 +39,8 @@ def load_models(site: Site) -> dict[str, Machine]:
     """Every machine's description; a bar is shown while bodies are fitted to meshes."""
     models: dict[str, Machine] = {}
     loaded: dict[tuple[str, str | None], Machine] = {}
-    with Progress(console=Console(stderr=True), transient=True) as bar:
+    console = Console(stderr=True)
+    with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
         for machine in site.machines:
             key = (machine.model, machine.sidecar)
             if key not in loaded:

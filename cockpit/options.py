@@ -10,7 +10,7 @@ from pathlib import Path
 class Options:
     """host, port: of the page; listen, connect: Zenoh endpoints; own: machines answered for;
     recording: whether; record: in which folder, None for the site's own; link_config: a Zenoh
-    configuration file."""
+    configuration file; metrics_token: for GET /metrics, empty for none."""
 
     host: str
     port: int
@@ -21,3 +21,4 @@ class Options:
     record: Path | None = None
     recording: bool = True
     link_config: Path | None = None
+    metrics_token: str = ""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import logging
 import os
 import subprocess
 import sys
@@ -16,6 +17,8 @@ from backend.machine.model import Machine
 from backend.shell.link.session import with_port
 from backend.site.site import Site, load_site
 from cockpit.announce import announce
+
+log = logging.getLogger(__name__)
 
 LOOPBACK = "tcp/127.0.0.1:0"
 LIVE = "tcp/127.0.0.1:7447"
@@ -79,8 +82,11 @@ def run_serve(
     recording: bool = True,
     record: Path | None = None,
     link_config: Path | None = None,
+    metrics_token: str = "",
 ) -> None:
-    """The cockpit on live machines, until interrupted. link_config: a Zenoh configuration file."""
+    """The cockpit on live machines, until interrupted. link_config: a Zenoh configuration file;
+    metrics_token: for GET /metrics.
+    """
     from cockpit.options import Options
     from cockpit.station import Station
 
@@ -91,11 +97,16 @@ def run_serve(
     listen = tuple(with_port(endpoint) for endpoint in listen)
     connect = connect or site.link.connect
     station = Station(
-        site, Options(host, port, listen, connect, own, "LIVE", record, recording, link_config)
+        site,
+        Options(
+            *(host, port, listen, connect, own, "LIVE"),
+            *(record, recording, link_config, metrics_token),
+        ),
     )
     with contextlib.closing(station):
         announce(site, station.web.port, host, open_browser)
         where = [f"listening on {e}" for e in listen] + [f"connected to {e}" for e in connect]
+        log.info("serving", extra={"site": site.name, "port": station.web.port})
         where = where or [f"as {link_config} says"]
         print(f"Machines: {', '.join(where)}.", flush=True)
         until.wait()

@@ -7,6 +7,7 @@ import gc
 import sys
 import time
 from collections.abc import Callable
+from importlib import import_module
 from typing import Any
 
 from backend.documents.site import site_document
@@ -15,6 +16,7 @@ from backend.errors import InputError
 from backend.pipeline.records import Snapshot
 from backend.shell.app.app import Sources, create_app
 from backend.shell.app.feed import Frames
+from backend.shell.app.metrics import metrics_router
 from backend.shell.app.server import WebServer, bind
 from backend.shell.app.viewer_proxy import Hooks, viewer_router
 from backend.shell.app.wire import dumps
@@ -32,6 +34,12 @@ from cockpit.resolutions import resolutions
 from cockpit.views.client_head import HEAD
 from cockpit.views.inputs import scene_site
 from cockpit.views.server import View, start
+
+AT_ONCE = (
+    *("backend.safety.approach_kernels", "backend.machine.outline_kernel"),
+    *("backend.shell.link.typestore", "backend.shell.app.image_frames", "backend.pipeline.whatif"),
+)
+"""Loaded at the start, not where they are first needed: no cycle of the fast loop waits for them."""
 
 
 class Station:
@@ -61,6 +69,8 @@ class Station:
     ) -> None:
         # The fast loop must not wait 5 ms, the default, for another thread to hand over.
         sys.setswitchinterval(0.001)
+        for module in AT_ONCE:
+            import_module(module)
         models = load_models(site)
         self.config = make_config(site, models, options.own, options.mode)
         self._demo_began = demo_began
@@ -101,6 +111,7 @@ class Station:
             sources,
             viewer_router(lambda: self.view.port, hooks, HEAD),
             hosts=LOOPBACK if loopback else ("*",),
+            routers=(metrics_router(frames, self.backend, self._recorded, options.metrics_token),),
         )
         self.web = WebServer(app, listener)
         self.recorder.start()
@@ -147,6 +158,9 @@ class Station:
             **{name: vars(watch.timing()) for name, watch in self.runner.image_timing.items()},
             "failure": self.runner.failure,
         }
+
+    def _recorded(self) -> dict[str, Any]:
+        return vars(self.recorder.state())
 
     def _on_message(self, message: dict[str, Any]) -> None:
         """What a page asks of the recording, or of the scene and the images."""

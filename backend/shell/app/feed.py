@@ -31,6 +31,7 @@ class Frames:
 
     hub: Hub
     document: Callable[[Snapshot], dict[str, Any]]
+    clients: int = 0  # on the websocket now
     _snapshot: tuple[int, bytes] = (-1, b"")
     _images: dict[tuple[str, str], tuple[float, bytes]] = field(default_factory=dict)
 
@@ -98,10 +99,9 @@ class Feed:
         self._frames = frames
         self._site = encode({"type": "site", **site})
         self._on_message = on_message
-        self.clients = 0
 
     async def serve(self, socket: WebSocket) -> None:
-        self.clients += 1
+        self._frames.clients += 1
         fresh = asyncio.Event()
         loop = asyncio.get_running_loop()
 
@@ -126,7 +126,7 @@ class Feed:
             for task in (sender, receiver):
                 task.cancel()
             await asyncio.gather(sender, receiver, return_exceptions=True)
-            self.clients -= 1
+            self._frames.clients -= 1
 
     async def _send(self, socket: WebSocket, fresh: asyncio.Event, flow: Flow) -> None:
         await socket.send_bytes(self._site)

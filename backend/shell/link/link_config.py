@@ -7,7 +7,6 @@ certificate is found here first, and said in one sentence.
 from __future__ import annotations
 
 import json
-import os
 import re
 import socket
 import ssl
@@ -19,6 +18,7 @@ import zenoh
 
 from backend.errors import InputError
 from backend.shell.link.certificates import read_certificate
+from backend.shell.private_file import check_private
 
 _CERTIFICATES = ("root_ca_certificate", "listen_certificate", "connect_certificate")
 _KEYS = ("listen_private_key", "connect_private_key")
@@ -50,7 +50,7 @@ def read_config(path: Path) -> Any:
             _named(path, field, lambda file: read_certificate(file), Path(tls[field]))
     for field in _KEYS:
         if tls.get(field):
-            _named(path, field, check_key, Path(tls[field]))
+            _named(path, field, check_private, Path(tls[field]))
     return config
 
 
@@ -60,17 +60,6 @@ def stated(config: Any, side: str) -> list[str]:
     if isinstance(endpoints, dict):
         endpoints = [one for several in endpoints.values() for one in several]
     return [str(one) for one in endpoints]
-
-
-def check_key(path: Path) -> None:
-    """Raises InputError for a key that is not there, or that others may read."""
-    try:
-        mode = path.stat().st_mode
-        path.open("rb").close()
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}.") from None
-    if os.name == "posix" and mode & 0o077:
-        raise InputError(f"{path}: can be read by others; allowed is mode 0600.")
 
 
 def check_partners(path: Path, config: Any, endpoints: Iterable[str]) -> None:
