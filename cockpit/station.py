@@ -39,7 +39,7 @@ AT_ONCE = (
     *("backend.safety.approach_kernels", "backend.machine.outline_kernel"),
     *("backend.shell.link.typestore", "backend.shell.app.image_frames", "backend.pipeline.whatif"),
 )
-"""Loaded at the start, not where they are first needed: no cycle of the fast loop waits for them."""
+"""Loaded at the start, not where they are first needed: no cycle of the loop waits for them."""
 
 
 class Station:
