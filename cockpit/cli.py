@@ -23,8 +23,10 @@ from cockpit.cli_entry import (
     users,
 )
 from cockpit.cli_formats import convert, export
+from cockpit.cli_keys import LinkConfig, keys
 from cockpit.cli_playback import add_commands
 from cockpit.cli_recordings import recordings
+from cockpit.logs import LogJson, LogLevel
 
 app = typer.Typer(
     name="cockpit",
@@ -54,6 +56,10 @@ Record = Annotated[
     Path | None,
     typer.Option(help="Folder of all recordings; default: the site file's, or the user's state."),
 ]
+MetricsTokenFile = Annotated[
+    Path | None,
+    typer.Option(help="File (0600) with the bearer token for GET /metrics; without it, 404."),
+]
 
 
 @app.command()
@@ -70,6 +76,8 @@ def demo(
     key: Key = None,
     self_signed: SelfSigned = False,
     insecure_http: InsecureHttp = False,
+    log_json: LogJson = False,
+    log_level: LogLevel = None,
 ) -> None:
     """Run a site with simulated machines, each in its own process, and open the page."""
     from backend.control.person import SUPERVISOR, Person
@@ -108,12 +116,19 @@ def serve(
     key: Key = None,
     self_signed: SelfSigned = False,
     insecure_http: InsecureHttp = False,
+    link_config: LinkConfig = None,
+    metrics_token_file: MetricsTokenFile = None,
+    log_json: LogJson = False,
+    log_level: LogLevel = None,
 ) -> None:
     """Run the cockpit on live machines, which publish to the Zenoh endpoint it listens on."""
+    from backend.shell.app.metrics import read_token
     from cockpit.entry import EntryOptions, decide
     from cockpit.run import run_serve
 
-    options = EntryOptions(users, no_login, one_time_link, cert, key, self_signed, insecure_http)
+    token = "" if metrics_token_file is None else read_token(metrics_token_file)
+    way_in = users, no_login, one_time_link, cert, key, self_signed, insecure_http
+    options = EntryOptions(*way_in, metrics_token=token)
     own = tuple(name.strip() for name in machines.split(",") if name.strip())
     run_serve(
         site,
@@ -126,6 +141,7 @@ def serve(
         until=_interrupted(),
         recording=not no_record,
         record=record,
+        link_config=link_config,
     )
 
 
@@ -137,11 +153,14 @@ def sim(
     start_at: Annotated[
         float | None, typer.Option(help="Epoch second at which the machine's program begins.")
     ] = None,
+    link_config: LinkConfig = None,
+    log_json: LogJson = False,
+    log_level: LogLevel = None,
 ) -> None:
     """Simulate one machine: publish as its hardware does and obey velocity commands."""
     from cockpit.run import run_sim
 
-    run_sim(site, machine, tuple(connect or ()), start_at, until=_interrupted())
+    run_sim(site, machine, tuple(connect or ()), start_at, _interrupted(), link_config)
 
 
 @app.command()
@@ -158,12 +177,15 @@ def agent(
     dbc: Annotated[
         Path | None, typer.Option(help="CAN frames; scenes/can/agent.dbc unless told otherwise.")
     ] = None,
+    link_config: LinkConfig = None,
+    log_json: LogJson = False,
+    log_level: LogLevel = None,
 ) -> None:
     """Run a machine's own agent: it grants the lease, obeys its holder and enforces limits."""
     from cockpit.run import run_agent
 
     can = (interface, channel, bitrate, dbc)
-    run_agent(site, machine, driver, can, tuple(connect or ()), until=_interrupted())
+    run_agent(site, machine, driver, can, tuple(connect or ()), _interrupted(), link_config)
 
 
 @app.command()
@@ -290,6 +312,7 @@ def recover(
 
 app.add_typer(recordings, name="recordings")
 app.add_typer(users, name="users")
+app.command()(keys)
 app.command()(convert)
 app.command()(export)
 

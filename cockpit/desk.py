@@ -6,7 +6,7 @@ import contextlib
 import math
 from collections.abc import Callable
 from dataclasses import asdict
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 from rich.progress import Progress
@@ -17,7 +17,6 @@ from backend.machine.model import Machine
 from backend.pipeline.config import Config
 from backend.pipeline.images import SunParameters
 from backend.pipeline.records import Snapshot
-from backend.pipeline.whatif import touches, what_if
 from backend.safety.partner import Limits
 from backend.shell.hub import Hub
 from backend.shell.image_loops import ImageLoop
@@ -26,7 +25,9 @@ from backend.shell.kinds import EXACT, REGIONS, SUN, ZONE, Recipe, Wishes
 from backend.site.bodies import site_bodies
 from backend.site.site import Site
 from backend.spatial.types import Array
-from cockpit.views.server import View
+
+if TYPE_CHECKING:
+    from cockpit.views.server import View
 
 MAX_HEIGHT = 50.0  # of a picked bucket tip above or below the swing joint [m]
 _LOOPS = (("images", (SUN, EXACT), "image_hz"), ("zones", (ZONE, REGIONS), "zone_hz"))
@@ -37,7 +38,8 @@ def load_models(site: Site) -> dict[str, Machine]:
     """Every machine's description; a bar is shown while bodies are fitted to meshes."""
     models: dict[str, Machine] = {}
     loaded: dict[tuple[str, str | None], Machine] = {}
-    with Progress(console=Console(stderr=True), transient=True) as bar:
+    console = Console(stderr=True)
+    with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
         for machine in site.machines:
             key = (machine.model, machine.sidecar)
             if key not in loaded:
@@ -86,20 +88,23 @@ def image_loops(site: Site, config: Config, closing: contextlib.ExitStack) -> tu
 class Desk:
     """Answers pages: what-if, ghosts, cameras, heights of reach images.
 
-    view: the 3D scene's; action: told what an operator did, on which page, with what details.
+    view: the 3D scene's, None while it starts; action: told what an operator did, on which
+    page, with what details; ready: whether what judges postures is loaded.
     """
 
     def __init__(
         self,
         config: Config,
         hub: Hub,
-        view: Callable[[], View],
+        view: Callable[[], View | None],
         action: Callable[[str, str | None, dict[str, Any]], None] = lambda *_: None,
+        ready: Callable[[], bool] = lambda: True,
     ) -> None:
         self._config = config
         self._hub = hub
         self._view = view
         self._action = action
+        self._ready = ready
         self._tip_heights: dict[str, float] = {}
 
     def wishes(self) -> Wishes:
@@ -114,6 +119,10 @@ class Desk:
             raise InputError(f'machine is "{own}"; allowed are {known}.')
         if snapshot is None:
             raise InputError("no cycle has finished yet; try again.")
+        if not self._ready():
+            raise InputError("what judges postures is still being loaded; try again.")
+        from backend.pipeline.whatif import what_if
+
         q = self._posture(own, joints, snapshot)
         self._action("whatif", None, {"machine": own, "joints": joints})
         found = what_if(snapshot, self._config, own, q)
@@ -129,19 +138,22 @@ class Desk:
             return
         if isinstance(kind, str):
             self._action(kind, page, message)
+        view = self._view()
         with contextlib.suppress(ValueError, InputError):
-            if kind == "ghost":
-                self._show_ghost(name, message.get("joints"), page)
-            elif kind == "zones":
-                self._view().set_zone_kind(str(message.get("kind")), page)
+            if view is not None and kind == "ghost":
+                self._show_ghost(view, name, message.get("joints"), page)
+            elif view is not None and kind == "zones":
+                view.set_zone_kind(str(message.get("kind")), page)
             elif not isinstance(name, str):
                 return
-            elif kind == "camera":
-                self._view().set_camera(name, page)
-            elif kind == "own":
-                self._view().set_own(name, page)
             elif kind == "tip_height" and name in self._config.own:
                 self._pick_height(name, message.get("height"))
+            elif view is None:
+                return
+            elif kind == "camera":
+                view.set_camera(name, page)
+            elif kind == "own":
+                view.set_own(name, page)
 
     def _posture(self, own: str, joints: dict[str, float], snapshot: Snapshot) -> Array:
         """(n,) the present joint values of a machine with those of `joints` in their places."""
@@ -157,17 +169,19 @@ class Desk:
             q[roles.index(role)] = value
         return q
 
-    def _show_ghost(self, machine: Any, joints: Any, page: str | None) -> None:
+    def _show_ghost(self, view: View, machine: Any, joints: Any, page: str | None) -> None:
         """A ghost in another posture; red where it would touch something."""
         snapshot = self._hub.latest()
         if machine is None or not isinstance(joints, dict) or snapshot is None:
-            self._view().set_ghost(None, page=page)
+            view.set_ghost(None, page=page)
             return
         touched = None
-        if machine in self._config.own:
+        if machine in self._config.own and self._ready():
+            from backend.pipeline.whatif import touches
+
             q = self._posture(machine, joints, snapshot)
             touched = touches(snapshot, self._config, machine, q)
-        self._view().set_ghost(machine, joints, page, touched)
+        view.set_ghost(machine, joints, page, touched)
 
     def _pick_height(self, own: str, height: Any) -> None:
         """The height of a machine's reach image, for all pages; None: as the tip is."""

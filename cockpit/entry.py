@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import os
 import socket
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from backend.control.person import SUPERVISOR, Person
@@ -17,9 +16,6 @@ from backend.shell.access.links import Links
 from backend.shell.access.places import state_folder
 from backend.shell.access.sessions import Sessions
 from backend.shell.access.users import Users, default_file
-
-METRICS_TOKEN = "EXCAVATOR_COCKPIT_METRICS_TOKEN"
-"""Environment variable: the bearer token of programs that read /metrics without a session."""
 
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
 ANYWHERE = ("", "0.0.0.0", "::")
@@ -36,12 +32,14 @@ class EntryOptions:
     key: Path | None = None
     self_signed: bool = False
     insecure_http: bool = False
+    metrics_token: str = ""
 
 
 @dataclass(frozen=True)
 class Entry:
     """host: of the page; users: who signs in with a password; link_for: whom one-time links sign
-    in; everybody: who all are, where nobody has to sign in; tls: None for plain HTTP.
+    in; everybody: who all are, where nobody has to sign in; tls: None for plain HTTP;
+    metrics_token: of programs that read /metrics without a session, empty for none.
     """
 
     host: str
@@ -49,6 +47,7 @@ class Entry:
     link_for: Person | None = None
     everybody: Person | None = None
     tls: Tls | None = None
+    metrics_token: str = ""
 
     @property
     def hosts(self) -> tuple[str, ...]:
@@ -81,7 +80,7 @@ class Entry:
             links=links,
             everybody=self.everybody,
             https=secure,
-            metrics_token=os.environ.get(METRICS_TOKEN) or None,
+            metrics_token=self.metrics_token or None,
         )
 
     def notes(self) -> list[str]:
@@ -103,6 +102,11 @@ class Entry:
 
 
 def decide(options: EntryOptions, host: str, link_for: Person | None = None) -> Entry:
+    """As `_decide`, with what does not depend on who gets in."""
+    return replace(_decide(options, host, link_for), metrics_token=options.metrics_token)
+
+
+def _decide(options: EntryOptions, host: str, link_for: Person | None) -> Entry:
     """What the options come to. Raises InputError for what is not safe or does not fit.
 
     link_for: whom one-time links sign in when no users file is named; None where a users file is

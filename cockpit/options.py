@@ -11,7 +11,8 @@ from cockpit.entry import Entry
 @dataclass(frozen=True)
 class Options:
     """host, port: of the page; listen, connect: Zenoh endpoints; own: machines answered for;
-    recording: whether; record: in which folder, None for the site's own; entry: who gets in."""
+    recording: whether; record: in which folder, None for the site's own; entry: who gets in;
+    link_config: a Zenoh configuration file."""
 
     entry: Entry
     port: int
@@ -21,3 +22,4 @@ class Options:
     mode: str
     record: Path | None = None
     recording: bool = True
+    link_config: Path | None = None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import gc
 import threading
 from pathlib import Path
 
@@ -24,6 +25,7 @@ def run_play(
     until: threading.Event,
 ) -> None:
     """A recorded session, until interrupted. path: None for what was recorded last."""
+    gc.disable()  # nothing of what is loaded now becomes garbage; `Starting` turns it on again
     seen = see(path or newest(recordings_root()), site_name)
     station = PlaybackStation(seen, Options(entry, port, source, speed, begin))
     with contextlib.closing(station):

@@ -7,12 +7,12 @@ whatever a page asks. A test sees to it that this module does not even load the 
 from __future__ import annotations
 
 import contextlib
-import gc
 import sys
 import tomllib
 from dataclasses import dataclass
+from importlib import import_module as load
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 from rich.progress import Progress
@@ -42,8 +42,15 @@ from cockpit.foreign import as_session
 from cockpit.resolutions import resolutions
 from cockpit.session_document import session_document
 from cockpit.session_files import session_file
-from cockpit.views.inputs import scene_site
-from cockpit.views.server import HEAD, View, start
+from cockpit.starting import Starting
+from cockpit.views.client_head import HEAD
+
+if TYPE_CHECKING:
+    from cockpit.views.server import View
+
+EVALUATE = "backend.shell.session.evaluate"
+WHAT_IF = "backend.pipeline.whatif"
+IMAGE_FRAMES = "backend.shell.app.image_frames"
 
 
 @dataclass(frozen=True)
@@ -127,6 +134,16 @@ class PlaybackStation:
     """Everything of one playback process."""
 
     def __init__(self, seen: Seen, options: Options) -> None:
+        self.view: View | None = None
+        self._starting = Starting(
+            (
+                ("playback", self._start_player),
+                ("the 3D scene", self._start_view),
+                ("what judges postures", lambda: load(WHAT_IF)),
+                ("the images", self._start_images),
+                ("the index", lambda: self.index.start()),
+            )
+        )
         self._closing = contextlib.ExitStack()
         listener = bind(options.entry.host, options.port)
         self._closing.callback(listener.close)
@@ -150,8 +167,12 @@ class PlaybackStation:
             self.hub,
             options.source,
             self.index.event_times,
+            wait=self._starting.wait,
         )
-        self.desk = Desk(self.config, self.hub, lambda: self.view)
+        self._source = options.source or self.player.sources[0]
+        self.desk = Desk(
+            self.config, self.hub, lambda: self.view, ready=lambda: self._starting.done
+        )
         self.images = ImageLoops(
             self.hub,
             image_loops(seen.site, self.config, self._closing),
@@ -159,9 +180,6 @@ class PlaybackStation:
             once=True,  # a paused cursor needs no second image
         )
         frames = Frames(self.hub, self.document)
-        models = dict(self.config.machines)
-        self.view: View = start(scene_site(seen.site, models), self.hub, own=self.config.own[0])
-        self._closing.callback(self.view.stop)
         sources = Sources(
             site=site_document(seen.site, self.config),
             frames=frames,
@@ -173,27 +191,40 @@ class PlaybackStation:
         self._closing.callback(access.close)
         hooks = Hooks(
             allow=lambda connection: access.identify(connection) is not None,
-            opened=self.view.attach,
-            closed=self.view.detach,
+            opened=lambda *at: self.view and self.view.attach(*at),
+            closed=lambda *at: self.view and self.view.detach(*at),
         )
         app = create_app(
             sources,
-            viewer_router(lambda: self.view.port, hooks, HEAD),
+            viewer_router(lambda: None if self.view is None else self.view.port, hooks, HEAD),
             hosts=options.entry.hosts,
             routers=(session_router(self),),
             access=access,
         )
         self.web = WebServer(app, listener, options.entry.tls)
-        self.player.start()
-        self._closing.callback(self.player.stop)
         self._begin(options)
-        self.images.start()
-        self._closing.callback(self.images.stop)
         self.web.start()
         self._closing.callback(self.web.stop)
-        self.index.start()
-        gc.collect()
-        gc.freeze()  # what is loaded by now stays; the collector need not walk through it again
+        self._starting.start()
+
+    def _start_player(self) -> None:
+        if self._source == "evaluated":
+            load(EVALUATE)
+        self.player.start()
+        self._closing.callback(self.player.stop)
+
+    def _start_view(self) -> None:
+        from cockpit.views.inputs import scene_site
+        from cockpit.views.server import start
+
+        scene = scene_site(self.seen.site, dict(self.config.machines))
+        self.view = start(scene, self.hub, own=self.config.own[0])
+        self._closing.callback(self.view.stop)
+
+    def _start_images(self) -> None:
+        load(IMAGE_FRAMES)  # before images come that need it
+        self.images.start()
+        self._closing.callback(self.images.stop)
 
     def _begin(self, options: Options) -> None:
         self.player.do("speed", options.speed)
@@ -204,6 +235,7 @@ class PlaybackStation:
 
     def close(self) -> None:
         """Close everything, in the reverse order of opening."""
+        self._starting.stop()
         self._closing.close()
 
     def document(self, snapshot: Snapshot) -> dict[str, Any]:
@@ -228,7 +260,7 @@ class PlaybackStation:
         return {
             "step": vars(self.player.timing.timing()),
             **{name: vars(watch.timing()) for name, watch in self.images.timing.items()},
-            "failure": self.player.failure or self.images.failure,
+            "failure": self.player.failure or self._starting.failure or self.images.failure,
         }
 
     def session(self) -> dict[str, Any]:

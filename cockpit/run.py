@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import logging
 import os
 import subprocess
 import sys
@@ -18,6 +19,8 @@ from backend.shell.priority import FIRST, set_niceness
 from backend.site.site import Site, load_site
 from cockpit.announce import announce
 from cockpit.entry import Entry
+
+log = logging.getLogger(__name__)
 
 LOOPBACK = "tcp/127.0.0.1:0"
 LIVE = "tcp/127.0.0.1:7447"
@@ -81,20 +84,26 @@ def run_serve(
     until: threading.Event,
     recording: bool = True,
     record: Path | None = None,
+    link_config: Path | None = None,
 ) -> None:
-    """The cockpit on live machines, until interrupted."""
+    """The cockpit on live machines, until interrupted. link_config: a Zenoh configuration file;"""
     from cockpit.options import Options
     from cockpit.station import Station
 
     set_niceness(FIRST)
     site = load_site(site_name)
-    listen = listen or site.link.listen or (() if connect or site.link.connect else (LIVE,))
+    listen = listen or site.link.listen
+    if not (listen or connect or site.link.connect or link_config):
+        listen = (LIVE,)
     listen = tuple(with_port(endpoint) for endpoint in listen)
     connect = connect or site.link.connect
-    station = Station(site, Options(entry, port, listen, connect, own, "LIVE", record, recording))
+    options = Options(*(entry, port, listen, connect, own, "LIVE", record, recording, link_config))
+    station = Station(site, options)
     with contextlib.closing(station):
         announce(site, entry, station.access, station.web.port, open_browser)
         where = [f"listening on {e}" for e in listen] + [f"connected to {e}" for e in connect]
+        log.info("serving", extra={"site": site.name, "port": station.web.port})
+        where = where or [f"as {link_config} says"]
         print(f"Machines: {', '.join(where)}.", flush=True)
         until.wait()
 
@@ -105,6 +114,7 @@ def run_sim(
     connect: tuple[str, ...],
     start_at: float | None,
     until: threading.Event,
+    link_config: Path | None = None,
 ) -> None:
     """One simulated machine, until interrupted."""
     from backend.shell.sim.process import run
@@ -112,7 +122,7 @@ def run_sim(
     set_niceness(FIRST)
     site = load_site(site_name)
     site.machine(machine)
-    run(site, machine, connect or (LIVE,), start_at, until)
+    run(site, machine, _partners(connect, link_config), start_at, until, link_config=link_config)
 
 
 def run_agent(
@@ -122,6 +132,7 @@ def run_agent(
     can: tuple[str, str, int, Path | None],
     connect: tuple[str, ...],
     until: threading.Event,
+    link_config: Path | None = None,
 ) -> None:
     """One machine's agent, until interrupted. can: interface, channel, bit rate, DBC file."""
     from backend.shell.agent.drivers.driver import Driver
@@ -142,7 +153,12 @@ def run_agent(
     set_niceness(FIRST)
     site = load_site(site_name)
     site.machine(machine)
-    run(site, machine, connect or (LIVE,), until, make)
+    run(site, machine, _partners(connect, link_config), until, make, link_config)
+
+
+def _partners(connect: tuple[str, ...], link_config: Path | None) -> tuple[str, ...]:
+    """Endpoints to connect to; none where the configuration says it."""
+    return connect or (() if link_config else (LIVE,))
 
 
 @contextlib.contextmanager

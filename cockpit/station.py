@@ -8,6 +8,7 @@ import logging
 import sys
 import time
 from collections.abc import Callable
+from importlib import import_module
 from typing import Any
 
 from backend.control.person import Person
@@ -18,6 +19,7 @@ from backend.pipeline.records import Inputs, Notice, Snapshot
 from backend.shell.alarm_log import AlarmLog
 from backend.shell.app.app import Sources, create_app
 from backend.shell.app.feed import Frames
+from backend.shell.app.metrics import metrics_router
 from backend.shell.app.server import WebServer, bind
 from backend.shell.app.viewer_proxy import Hooks, viewer_router
 from backend.shell.app.wire import dumps
@@ -34,8 +36,15 @@ from cockpit.driving import make_driving
 from cockpit.options import Options
 from cockpit.recording import make_recorder, recording_sources, site_folder
 from cockpit.resolutions import resolutions
+from cockpit.views.client_head import HEAD
 from cockpit.views.inputs import scene_site
-from cockpit.views.server import HEAD, View, start
+from cockpit.views.server import View, start
+
+AT_ONCE = (
+    *("backend.safety.approach_kernels", "backend.machine.outline_kernel"),
+    *("backend.shell.link.typestore", "backend.shell.app.image_frames", "backend.pipeline.whatif"),
+)
+"""Loaded at the start, not where they are first needed: no cycle of the loop waits for them."""
 
 log = logging.getLogger(__name__)
 
@@ -67,13 +76,15 @@ class Station:
     ) -> None:
         # The fast loop must not wait 5 ms, the default, for another thread to hand over.
         sys.setswitchinterval(0.001)
+        for module in AT_ONCE:
+            import_module(module)
         models = load_models(site)
         self.config = make_config(site, models, options.own, options.mode)
         self._demo_began = demo_began
         self._driving_failure = ""
         self.hub = Hub()
         self.document = OncePerSnapshot(self._document)
-        session = open_session(options.listen, options.connect, mode="router")
+        session = open_session(options.listen, options.connect, "router", options.link_config)
         self._closing.callback(session.close)
         prefixes = {machine.prefix: machine.name for machine in site.machines}
         self.recorder = make_recorder(site, self.config, options)
@@ -122,6 +133,9 @@ class Station:
             sources,
             viewer_router(lambda: self.view.port, hooks, HEAD),
             hosts=options.entry.hosts,
+            routers=(
+                metrics_router(frames, self.backend, self._recorded, options.entry.metrics_token),
+            ),
             access=access,
         )
         self.web = WebServer(app, listener, options.entry.tls)
@@ -172,6 +186,9 @@ class Station:
             **{name: vars(watch.timing()) for name, watch in self.runner.image_timing.items()},
             "failure": self.runner.failure or self._driving_failure,
         }
+
+    def _recorded(self) -> dict[str, Any]:
+        return vars(self.recorder.state())
 
     def _after_cycle(self, inputs: Inputs, snapshot: Snapshot) -> None:
         if not self._driving_failure:

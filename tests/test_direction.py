@@ -47,6 +47,7 @@ ROOMS: dict[str, set[str]] = {
 LIBRARIES: dict[str, str | tuple[str, ...]] = {
     "fcl": "backend.collision",
     "zenoh": "backend.shell.link",
+    "cryptography": "backend.shell",
     "rosbags": "backend.shell",
     "mcap": "backend.shell.session",
     "zstandard": "backend.shell.session",

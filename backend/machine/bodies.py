@@ -11,7 +11,6 @@ from typing import TypeAlias
 import numpy as np
 
 from backend.errors import InputError
-from backend.machine import fitting
 from backend.machine.meshes import triangles_of
 from backend.machine.model import PARTS
 from backend.machine.sidecar import BodiesTable
@@ -104,6 +103,8 @@ def fitted(
     known = _read(path)
     if known is not None:
         return known
+    from backend.machine import fitting  # compiled code and scipy, which few starts need
+
     report = None if progress is None else (lambda share: progress(f"fitting boxes: {name}", share))
     boxes = fitting.fit_boxes(triangles, max_boxes, max_excess, report)
     _write(path, boxes)
@@ -118,7 +119,7 @@ def _cache_folder() -> Path:
 def _key(triangles: Array, max_boxes: int, max_excess: float) -> str:
     digest = hashlib.sha256(np.ascontiguousarray(triangles).tobytes())
     digest.update(f"{max_boxes} {max_excess!r}".encode())
-    for source in sorted(Path(fitting.__file__).parent.glob("fitting*.py")):
+    for source in sorted(Path(__file__).parent.glob("fitting*.py")):
         digest.update(source.read_bytes())  # another algorithm gives other boxes
     return digest.hexdigest()[:32]
 

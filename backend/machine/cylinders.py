@@ -16,9 +16,6 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import ConvexHull, QhullError
 
 from backend.spatial import transform
 from backend.spatial.types import Array, IntArray, frozen
@@ -201,6 +198,9 @@ def tube(radius: float, length: float, spread: float = 0.0, sections: int = 12) 
 
 def connected(triangles: Array) -> list[Array]:
     """The triangles (n, 3, 3) grouped by shared corners (0.01 mm)."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
     corners = np.round(triangles.reshape(-1, 3), 5)
     _, index = np.unique(corners, axis=0, return_inverse=True)
     faces: IntArray = index.reshape(-1, 3).astype(np.int64)
@@ -249,6 +249,8 @@ def _placed(strut: Strut, pin: Array, direction: Array, hinge: Array) -> Array:
 
 def _hull(points: Array) -> Array:
     """The convex hull's triangles (n, 3, 3); the points' own triangles when they are flat."""
+    from scipy.spatial import ConvexHull, QhullError
+
     try:
         hull = ConvexHull(points)
     except QhullError:

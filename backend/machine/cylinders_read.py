@@ -37,7 +37,6 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 
 from backend.errors import InputError
 from backend.machine.cylinders import Cylinder, Linkage, Strut, tube
-from backend.machine.fitting_clip import clip
 from backend.spatial.types import Array
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
@@ -147,6 +146,8 @@ def _strut(table: StrutTable, load_mesh: LoadMesh) -> Strut:
         triangles = load_mesh(table.mesh)
         if table.length is not None and np.linalg.norm(toward - pin) > 0.0:
             along = (toward - pin) / np.linalg.norm(toward - pin)
+            from backend.machine.fitting_clip import clip
+
             triangles = clip(triangles, along, float(along @ pin) + table.length)
         return Strut(triangles, pin, toward, _unit(table.hinge))
     assert table.radius is not None

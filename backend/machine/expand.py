@@ -7,9 +7,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import xacro
-import xacro.substitution_args as substitution
-
 from backend.errors import InputError
 
 _XACRO_STATE = threading.Lock()  # the xacro package keeps its state in module globals
@@ -30,6 +27,8 @@ def urdf_text(path: Path) -> str:
 
 
 def _expand(path: Path) -> str:
+    import xacro
+
     def find(package: str) -> str:
         folder = find_package(package, path.parent)
         if folder is None:
@@ -59,17 +58,20 @@ class _Patched:
     """xacro asks ROS's index for $(find package); while inside, it asks `find`."""
 
     def __init__(self, find: Callable[[str], str]) -> None:
+        import xacro.substitution_args as substitution
+
         self.find = find
+        self.substitution: Any = substitution
         self.saved: Any = None
 
     def __enter__(self) -> None:
-        self.saved = substitution._eval_find
-        substitution._eval_find = self.find
-        substitution._eval_dict["find"] = self.find
+        self.saved = self.substitution._eval_find
+        self.substitution._eval_find = self.find
+        self.substitution._eval_dict["find"] = self.find
 
     def __exit__(self, *_: object) -> None:
-        substitution._eval_find = self.saved
-        substitution._eval_dict["find"] = self.saved
+        self.substitution._eval_find = self.saved
+        self.substitution._eval_dict["find"] = self.saved
 
 
 def find_package(package: str, folder: Path) -> Path | None:

@@ -10,14 +10,14 @@ from __future__ import annotations
 import re
 from functools import lru_cache
 from pathlib import Path
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
-import trimesh
 
 from backend.errors import InputError
 from backend.machine.expand import find_mesh
 from backend.machine.model import Visual
+from backend.machine.primitives import box, cylinder
 from backend.machine.urdf import Color, Geometry
 from backend.spatial import transform
 from backend.spatial.types import AnyArray, Array
@@ -60,13 +60,15 @@ def _surfaces(geometry: Geometry, folder: Path, file: str) -> list[Surface]:
         flip = -1 if np.prod(scale) < 0 else 1  # a mirrored mesh keeps its faces outward
         return [(vertices * scale, faces[:, ::flip], color) for vertices, faces, color in loaded]
     if geometry.kind == "box":
-        solid = trimesh.creation.box(extents=geometry.size)
+        vertices, faces = box(*geometry.size)
     elif geometry.kind == "cylinder":
-        radius, height = geometry.size
-        solid = trimesh.creation.cylinder(radius=radius, height=height, sections=24)
+        vertices, faces = cylinder(*geometry.size)
     else:
+        import trimesh
+
         solid = trimesh.creation.icosphere(subdivisions=2, radius=geometry.size[0])
-    return [(np.array(solid.vertices, dtype=float), np.array(solid.faces), None)]
+        vertices, faces = np.array(solid.vertices, dtype=float), np.array(solid.faces)
+    return [(vertices, faces, None)]
 
 
 def _load(path: Path, file: str) -> list[Surface]:
@@ -76,6 +78,8 @@ def _load(path: Path, file: str) -> list[Surface]:
 
 @lru_cache(maxsize=64)
 def _load_version(path: Path, _modified: int, _size: int, file: str) -> tuple[Surface, ...]:
+    import trimesh  # takes a second, and most machines are made of primitives
+
     try:
         scene = trimesh.load_scene(str(path))
         meshes = [m for m in scene.dump(concatenate=False) if isinstance(m, trimesh.Trimesh)]
@@ -102,7 +106,7 @@ def _unit(path: Path) -> float:
     return float(found.group(1)) if found else 1.0
 
 
-def _face_colors(mesh: trimesh.Trimesh) -> AnyArray | None:
+def _face_colors(mesh: Any) -> AnyArray | None:
     """(faces, 3) 0..255, or None when the mesh has none; a texture is read at faces' middles."""
     visual = mesh.visual
     if not visual.defined:

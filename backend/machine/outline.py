@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from backend.machine.kinematics import body_boxes
 from backend.machine.model import PARTS, Machine
 from backend.spatial.boxes import Boxes
-from backend.spatial.types import Array, IntArray
+from backend.spatial.types import Array
 
 
 def part_outlines(machine: Machine, T_site_links: Array) -> dict[str, Array]:
@@ -22,6 +21,8 @@ def part_outlines(machine: Machine, T_site_links: Array) -> dict[str, Array]:
 
 def outlines_of(machine: Machine, boxes: Boxes) -> dict[str, Array]:
     """The same from the machine's placed bodies."""
+    from backend.machine.outline_kernel import convex_hull
+
     plan = boxes.corners()[..., :2]
     parts = machine.body_parts
     outlines = {}
@@ -30,28 +31,3 @@ def outlines_of(machine: Machine, boxes: Boxes) -> dict[str, Array]:
         if len(points):
             outlines[part] = convex_hull(points, np.lexsort((points[:, 1], points[:, 0])))
     return outlines
-
-
-@njit(cache=True, nogil=True)
-def convex_hull(points: Array, order: IntArray) -> Array:
-    """Andrew's monotone chain: hull (k, 2) of points (n, 2), counter-clockwise.
-
-    order: indices that sort the points by x, then y. Two points where all lie on a line.
-    """
-    n = len(order)
-    hull = np.empty((2 * n, 2))
-    k = 0
-    for turn in range(2):
-        first = k
-        for step in range(n):
-            p = points[order[step if turn == 0 else n - 1 - step]]
-            while k >= first + 2:
-                ax, ay = hull[k - 1, 0] - hull[k - 2, 0], hull[k - 1, 1] - hull[k - 2, 1]
-                bx, by = p[0] - hull[k - 2, 0], p[1] - hull[k - 2, 1]
-                if ax * by - ay * bx > 1e-12:
-                    break
-                k -= 1
-            hull[k] = p
-            k += 1
-        k -= 1  # the last point begins the other chain, or closes the hull
-    return hull[:k].copy()

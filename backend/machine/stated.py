@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from backend.errors import InputError
-from backend.machine.fitting_clip import outside_box, subdivided
 from backend.machine.sidecar import BoxTable
 from backend.spatial import rotation
 from backend.spatial.boxes import Boxes
@@ -77,6 +76,8 @@ def left_out(boxes: Boxes, triangles: Array) -> tuple[float, Array]:
     is to the box from which the point sticks out least, across its nearest side. 0 where all is
     inside.
     """
+    from backend.machine.fitting_clip import outside_box, subdivided  # compiled code
+
     rest = triangles
     for R, c, h in zip(boxes.rotations, boxes.centers, boxes.half_extents, strict=True):
         rest = outside_box(rest, R, R.T @ c - h - ROUNDING, R.T @ c + h + ROUNDING)

@@ -20,7 +20,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from backend.machine.model import Machine
-from backend.safety.approach_kernels import rows
 from backend.safety.braking import accelerations, full_speeds, stopping_distance
 from backend.safety.hulls import hulls
 from backend.spatial.types import Array, BoolArray, IntArray
@@ -84,6 +83,8 @@ def approach(
     keep: p_l and what both poses may be wrong by [m]; age: of the own data [s]; delay: the longest
     total delay that commands can have [s].
     """
+    from backend.safety.approach_kernels import rows  # compiled code, which playback can do without
+
     full, a = full_speeds(machine), accelerations(machine)
     axes, origins = _axes(machine, own.T_site_links)
     mine, its = hulls(machine), hulls(other_machine)

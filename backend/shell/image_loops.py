@@ -128,6 +128,8 @@ class ImageLoops:
         try:
             self._run(loop)
         except Exception as error:
+            if self._stopping.is_set():
+                return  # its process was ended under its hands
             self._fatal[loop.name] = f"{loop.name} loop stopped: {error!r}"
             log.exception("%s", self._fatal[loop.name])
 

@@ -1,19 +1,23 @@
-"""What images a running backend makes of its snapshots."""
+"""What images a running backend makes of its snapshots.
+
+What makes them is imported where they are made: that is compiled code, a second of loading, and a
+program that waits for it could have shown its page meanwhile.
+"""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from backend.pipeline.config import Config
-from backend.pipeline.exact import Cells, own_image, own_machines
 from backend.pipeline.images import SunParameters, ordered_pairs, pair_image
 from backend.pipeline.records import Snapshot
-from backend.pipeline.regions import regions_image
-from backend.pipeline.zones import zone_image
+
+if TYPE_CHECKING:
+    from backend.pipeline.exact import Cells
 
 SUN, EXACT, ZONE, REGIONS = "sun", "exact", "zone", "regions"
 
@@ -46,12 +50,15 @@ class Made:
 
 @dataclass(frozen=True)
 class Recipe:
-    """Kinds that are made together, one after the other. Plain data, for another process."""
+    """Kinds that are made together, one after the other. Plain data, for another process.
+
+    cells: None for the usual number.
+    """
 
     config: Config
     sun: SunParameters
     kinds: tuple[str, ...]
-    cells: Cells = field(default_factory=Cells)
+    cells: Cells | None = None
 
 
 def make_images(recipe: Recipe, snapshot: Snapshot, wishes: Wishes) -> list[Made]:
@@ -68,14 +75,20 @@ def make_images(recipe: Recipe, snapshot: Snapshot, wishes: Wishes) -> list[Made
 def _makers(
     kind: str, recipe: Recipe, snapshot: Snapshot, wishes: Wishes
 ) -> list[Callable[[], Image]]:
-    config, cells = recipe.config, recipe.cells
+    config = recipe.config
     if kind in (SUN, ZONE):
         pairs = ordered_pairs(snapshot, config)
         if kind == ZONE:
+            from backend.pipeline.zones import zone_image
+
             return [partial(zone_image, snapshot, config, *pair) for pair in pairs]
         return [partial(pair_image, snapshot, config, *pair, recipe.sun) for pair in pairs]
+    from backend.pipeline.exact import Cells, own_image, own_machines
+
     machines = own_machines(snapshot, config)
     if kind == REGIONS:
+        from backend.pipeline.regions import regions_image
+
         return [partial(regions_image, snapshot, config, own) for own in machines]
-    heights = wishes.tip_heights
+    cells, heights = recipe.cells or Cells(), wishes.tip_heights
     return [partial(own_image, snapshot, config, own, cells, heights.get(own)) for own in machines]

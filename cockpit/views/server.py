@@ -5,7 +5,6 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,9 +19,6 @@ from cockpit.views.inputs import SceneSite, SnapshotSource
 from cockpit.views.opening import open_server
 from cockpit.views.scene import Scene
 from cockpit.views.zone import EXACT, ZONE_KINDS
-
-HEAD = (Path(__file__).parent / "client_head.html").read_text(encoding="utf-8")
-"""Put in the head of viser's client page by whoever serves it to browsers."""
 
 RATE = 25.0  # updates a second while somebody looks
 IDLE_RATE = 2.0  # while nobody does

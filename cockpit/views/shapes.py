@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import shapely
-import trimesh
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
@@ -91,10 +90,19 @@ def feature_edges(
     vertices: Float32, faces: UInt32, angle: float = 0.7, shortest: float = 0.06, most: int = 240
 ) -> Float32:
     """The longest edges (k, 2, 3), k <= most, where the surface turns by over `angle` [rad]."""
-    mesh = trimesh.Trimesh(vertices, faces, process=False)
-    mesh.merge_vertices(merge_tex=True, merge_norm=True)
-    sharp = mesh.face_adjacency_edges[mesh.face_adjacency_angles > angle]
-    edges = np.asarray(mesh.vertices[sharp], dtype=np.float32)
+    points, merged = np.unique(vertices + 0.0, axis=0, return_inverse=True)
+    corners = merged.reshape(-1)[faces]
+    first, second, third = np.moveaxis(points[corners].astype(float), 1, 0)
+    normals = np.cross(second - first, third - first)
+    areas = np.linalg.norm(normals, axis=1)
+    corners, normals = corners[areas > 0.0], normals[areas > 0.0] / areas[areas > 0.0, None]
+    sides = np.sort(corners[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    order = np.lexsort((sides[:, 1], sides[:, 0]))
+    ends, start, count = np.unique(sides[order], axis=0, return_index=True, return_counts=True)
+    start, ends = start[count == 2], ends[count == 2]  # where just two triangles meet
+    a, b = normals[order[start] // 3], normals[order[start + 1] // 3]
+    sharp = ends[np.einsum("ij,ij->i", a, b) < np.cos(angle)]
+    edges = np.asarray(points[sharp], dtype=np.float32)
     lengths = np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1)
     order = np.argsort(-lengths)[:most]
     return edges[order[lengths[order] > shortest]]

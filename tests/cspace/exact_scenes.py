@@ -11,7 +11,7 @@ import coal
 import numpy as np
 import pytest
 
-from backend.machine import bodies, load
+from backend.machine import fitting, load
 from backend.machine.kinematics import body_boxes, link_poses
 from backend.machine.load import load_machine
 from backend.machine.model import Machine
@@ -51,7 +51,7 @@ def _zx200_of_boxes() -> Machine:
 
     with pytest.MonkeyPatch.context() as patch, TemporaryDirectory() as cache:
         patch.setenv("XDG_CACHE_HOME", cache)
-        patch.setattr(bodies.fitting, "fit_boxes", one_box)
+        patch.setattr(fitting, "fit_boxes", one_box)
         patch.setattr(load, "read_sidecar", without_boxes)
         return load_machine("zx200.xacro", base_folder=SHARED)
 

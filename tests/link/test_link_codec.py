@@ -23,7 +23,8 @@ from backend.fusion.samples import (
 )
 from backend.shell.link import encode
 from backend.shell.link.codec import DecodeError, decode, decode_clock, decode_limits, fix_quality
-from backend.shell.link.messages import TYPESTORE, AgentStatus, Command, MotionLimits, TrueState
+from backend.shell.link.messages import AgentStatus, Command, MotionLimits, TrueState
+from backend.shell.link.typestore import TYPESTORE
 from backend.spatial.angles import difference
 from backend.spatial.rotation import from_attitude, to_quaternion
 

@@ -9,7 +9,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from backend.shell.link.codec import _READERS
-from backend.shell.link.messages import TYPESTORE
 from backend.shell.link.session import open_session, publisher, zenoh_congestion, zenoh_priority
 from backend.shell.link.topics import (
     TOPICS,
@@ -21,6 +20,7 @@ from backend.shell.link.topics import (
     topic,
 )
 from backend.shell.link.topics_table import topics_markdown
+from backend.shell.link.typestore import TYPESTORE
 
 FIELDS = {"machine": "left", "link": "boom", "kind": "sun"}
 

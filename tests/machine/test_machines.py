@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from backend.machine import bodies, kinematics
+from backend.machine import fitting, kinematics
 from backend.machine.bodies import overlaps
 from backend.machine.load import load_machine, shipped_machines
 from backend.machine.model import PARTS, Machine
@@ -158,7 +158,7 @@ def meshed(tiny, tmp_path, monkeypatch):
         low, high = triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1))
         return Boxes((low + high)[None] / 2, np.eye(3)[None], (high - low)[None] / 2)
 
-    monkeypatch.setattr(bodies.fitting, "fit_boxes", fit)
+    monkeypatch.setattr(fitting, "fit_boxes", fit)
     return tiny(('<sphere radius="0.25"/>', '<mesh filename="b.stl"/>')), calls
 
 

@@ -8,7 +8,8 @@ import shapely
 
 from backend.machine import kinematics
 from backend.machine.load import load_machine
-from backend.machine.outline import convex_hull, part_outlines
+from backend.machine.outline import part_outlines
+from backend.machine.outline_kernel import convex_hull
 
 
 def hull(points: np.ndarray) -> np.ndarray:

@@ -10,7 +10,7 @@ import pytest
 import trimesh
 
 from backend.errors import InputError
-from backend.machine import bodies
+from backend.machine import fitting
 from backend.machine.load import fit_tasks, load_machine
 from backend.machine.sidecar import Sidecar
 from backend.machine.stated import as_toml, boxes_of, left_out, tables_of
@@ -46,7 +46,7 @@ def meshed(tiny, tmp_path, monkeypatch):
         raise AssertionError("fitted")
 
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    monkeypatch.setattr(bodies.fitting, "fit_boxes", fit)
+    monkeypatch.setattr(fitting, "fit_boxes", fit)
     trimesh.creation.box(extents=(0.5, 0.4, 0.3)).export(tmp_path / "b.stl")
     return tiny(('<sphere radius="0.25"/>', '<mesh filename="b.stl"/>'))
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import time
+import urllib.error
 import urllib.request
 from collections.abc import Iterator
 from pathlib import Path
@@ -120,6 +121,34 @@ def test_next_event_is_two_actions_away(playing: Backend) -> None:
         socket.send(json.dumps({"type": "playback", "do": "next"}))
         times = (header["playback"]["time"] for _, header in frames(socket, 90.0))
         assert next(t for t in times if t != 1.0) == pytest.approx(first, abs=1e-3)
+
+
+def test_what_starts_after_the_page_comes_by_itself(playing: Backend) -> None:
+    """The scene, and what judges postures."""
+    refusals: list[tuple[int, bool]] = []
+
+    def scene() -> bool:
+        with urllib.request.urlopen(playing.url + "/view/", timeout=10) as answer:
+            return bool(answer.status == 200)
+
+    def judged() -> bool:
+        question = json.dumps({"machine": "left", "joints": {}}).encode()
+        headers = {"Content-Type": "application/json"}
+        request = urllib.request.Request(playing.url + "/api/whatif", question, headers)
+        try:
+            with urllib.request.urlopen(request, timeout=30) as answer:
+                return "checked_by" in json.loads(answer.read())
+        except urllib.error.HTTPError as error:
+            refusals.append((error.code, b"still being loaded" in error.read()))
+            return False
+
+    for come in (scene, judged):
+        deadline = time.monotonic() + 120.0
+        while not come():
+            assert time.monotonic() < deadline
+            time.sleep(0.2)
+    assert set(refusals) <= {(422, True)}
+    assert playing.get("/api/health")["backend"]["failure"] == ""
 
 
 def test_commands_reach_nobody(playing: Backend) -> None:

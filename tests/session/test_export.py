@@ -15,7 +15,7 @@ from mcap.reader import make_reader
 from program import Done, cockpit
 from rosbags.highlevel import AnyReader
 
-from backend.shell.link.messages import TYPESTORE
+from backend.shell.link.typestore import TYPESTORE
 from backend.shell.session.format import ALARM, SNAPSHOT, Header, Message, dumps
 from backend.shell.session.sun2020 import NAME
 from backend.shell.session.writer import SessionWriter

@@ -27,7 +27,8 @@ from websockets.exceptions import ConnectionClosed, InvalidHandshake
 
 from backend.fusion.pose import Validity
 from backend.shell.app.viewer_proxy import Hooks, viewer_router, views_only
-from cockpit.views.server import HEAD, View, start
+from cockpit.views.client_head import HEAD
+from cockpit.views.server import View, start
 
 PROTOCOL = f"viser-v{viser.__version__}"
 
@@ -39,6 +40,7 @@ class Front:
     port: int
     view: View
     source: toy.Source
+    starting: bool = False
     refused: set[str] = field(default_factory=set)  # paths that `allow` turns away
 
     @property
@@ -61,7 +63,7 @@ def front() -> Iterator[Front]:
 
     app = FastAPI()
     hooks = Hooks(allow=allow, opened=view.attach, closed=view.detach)
-    app.include_router(viewer_router(lambda: view.port, hooks, HEAD))
+    app.include_router(viewer_router(lambda: None if made.starting else view.port, hooks, HEAD))
     server = uvicorn.Server(
         uvicorn.Config(app, "127.0.0.1", made.port, log_level="error", lifespan="off")
     )
@@ -111,6 +113,18 @@ def shake(
             return None
 
     return asyncio.run(try_it())
+
+
+def test_while_the_scene_starts_a_page_stands_there_that_asks_again(front: Front) -> None:
+    front.starting = True
+    answer = get(front, "/view/abc/?darkMode")
+    assert answer.status_code == 202
+    assert 'http-equiv="refresh"' in answer.text
+    assert answer.headers["cache-control"] == "no-store"
+    assert shake(front) is None
+    front.starting = False
+    assert get(front, "/view/abc/?darkMode").status_code == 200
+    assert shake(front) is not None
 
 
 def test_the_client_page_comes_with_the_head_and_a_policy(front: Front) -> None:

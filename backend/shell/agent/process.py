@@ -10,6 +10,7 @@ import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -70,17 +71,19 @@ def run(
     connect: tuple[str, ...],
     until: threading.Event,
     make_driver: Callable[[Machine, Callable[[], float]], Driver],
+    link_config: Path | None = None,
 ) -> None:
     """The agent of the machine `name` of the site, until `until` is set.
 
-    make_driver: from the machine and a clock [s]. Raises InputError for a bad site or endpoint.
+    make_driver: from the machine and a clock [s]; link_config: a Zenoh configuration file. Raises
+    InputError for a bad site or endpoint.
     """
     entry = site.machine(name)
     sidecar = None if entry.sidecar is None else site.folder / entry.sidecar
     machine = load_machine(entry.model, sidecar, site.folder)
     driver = make_driver(machine, time.monotonic)
     try:
-        session = open_session(connect=connect)
+        session = open_session(connect=connect, config_file=link_config)
         try:
             run_agent(machine, name, entry.prefix, driver, session, until)
         finally:

@@ -16,7 +16,6 @@ from fastapi import WebSocket, WebSocketDisconnect
 
 from backend.control.person import Person
 from backend.pipeline.records import Snapshot
-from backend.shell.app.image_frames import frame_of
 from backend.shell.app.wire import encode
 from backend.shell.hub import Hub
 
@@ -33,6 +32,7 @@ class Frames:
 
     hub: Hub
     document: Callable[[Snapshot], dict[str, Any]]
+    clients: int = 0  # on the websocket now
     _snapshot: tuple[int, bytes] = (-1, b"")
     _images: dict[tuple[str, str], tuple[float, bytes]] = field(default_factory=dict)
 
@@ -47,6 +47,10 @@ class Frames:
     def images(self) -> dict[tuple[str, str], tuple[float, bytes]]:
         """(state_time, frame) of every image, by kind and key."""
         images = self.hub.images()
+        if not images:
+            return {}
+        from backend.shell.app.image_frames import frame_of  # loaded with the images' own modules
+
         for key, image in images.items():
             known = self._images.get(key)
             if known is not None and known[0] == image.state_time:
@@ -112,7 +116,6 @@ class Feed:
         self._site = encode({"type": "site", **site})
         self._on_message = on_message
         self._seats = seats
-        self.clients = 0
 
     async def serve(self, socket: WebSocket, person: Person | None = None) -> None:
         """person: who opened the page; without one, and without seats, it only looks."""
@@ -137,7 +140,7 @@ class Feed:
         on_message: Callable[[dict[str, Any]], None],
         greeting: bytes = b"",
     ) -> None:
-        self.clients += 1
+        self._frames.clients += 1
         fresh = asyncio.Event()
         loop = asyncio.get_running_loop()
 
@@ -162,7 +165,7 @@ class Feed:
             for task in (sender, receiver):
                 task.cancel()
             await asyncio.gather(sender, receiver, return_exceptions=True)
-            self.clients -= 1
+            self._frames.clients -= 1
 
     async def _send(
         self, socket: WebSocket, fresh: asyncio.Event, flow: Flow, greeting: bytes

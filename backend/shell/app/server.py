@@ -44,6 +44,7 @@ class WebServer:
         config = uvicorn.Config(
             app,
             log_level="warning",
+            log_config=None,  # as the whole program logs
             ws="websockets-sansio",
             ws_max_size=65536,
             ws_ping_interval=5.0,

@@ -16,7 +16,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from urllib.parse import urlsplit
 
-import httpx
 import msgspec
 from fastapi import APIRouter, HTTPException, Request, Response, WebSocket, WebSocketDisconnect
 from fastapi.responses import RedirectResponse
@@ -39,6 +38,17 @@ POLICY = (
     "font-src data:; connect-src 'self' data: blob:; frame-ancestors 'self'; base-uri 'none'; "
     "form-action 'none'"
 )
+STARTING = (
+    '<!doctype html><meta charset="utf-8"><meta http-equiv="refresh" content="0.5">'
+    "<style>body{background:#15181c;color:#9aa4ae;font:14px sans-serif;padding:1em}</style>"
+    "<title>3D scene</title><p>The 3D scene is starting …"
+)
+STARTING_HEADERS = {
+    "Cache-Control": "no-store",
+    "Content-Security-Policy": POLICY,
+    "X-Content-Type-Options": "nosniff",
+    "Referrer-Policy": "same-origin",
+}
 
 
 def only_looks(connection: HTTPConnection) -> bool:
@@ -83,10 +93,11 @@ class Hooks:
     closed: Callable[[str, int], None] = _nothing
 
 
-def viewer_router(port: Callable[[], int], hooks: Hooks, head: str = "") -> APIRouter:
+def viewer_router(port: Callable[[], int | None], hooks: Hooks, head: str = "") -> APIRouter:
     """Routes GET /view/, GET /view/{page}/ and websockets /view, /view/{page}.
 
-    port: where the scene's server listens on 127.0.0.1, asked for each time;
+    port: where the scene's server listens on 127.0.0.1, asked for each time; None while it starts,
+    then a page that asks again by itself stands there;
     head: HTML put at the start of the client page's head.
     """
     router = APIRouter(include_in_schema=False)
@@ -98,6 +109,8 @@ def viewer_router(port: Callable[[], int], hooks: Hooks, head: str = "") -> APIR
         if page and not PAGE_TOKEN.fullmatch(page):
             raise HTTPException(404, "no such page")
         upstream = port()
+        if upstream is None:
+            return Response(STARTING, 202, media_type="text/html", headers=STARTING_HEADERS)
         if upstream not in cached:
             html = await _fetch(upstream, head)
             cached.clear()
@@ -120,9 +133,13 @@ def viewer_router(port: Callable[[], int], hooks: Hooks, head: str = "") -> APIR
         if not (same_host(websocket) and known and protocol and hooks.allow(websocket)):
             await websocket.close(REFUSED)  # before accept: the handshake is answered with 403
             return
+        upstream = port()
+        if upstream is None:
+            await websocket.close(GONE)
+            return
         try:
             connection = await connect(
-                f"ws://127.0.0.1:{port()}",
+                f"ws://127.0.0.1:{upstream}",
                 subprotocols=[Subprotocol(protocol)],
                 compression=None,
                 max_size=None,
@@ -167,6 +184,8 @@ def _protocol(websocket: WebSocket) -> str | None:
 
 async def _fetch(port: int, head: str) -> bytes:
     """The client page (one file with everything in it), `head` added."""
+    import httpx
+
     try:
         async with httpx.AsyncClient(trust_env=False, timeout=10.0) as client:
             answer = await client.get(f"http://127.0.0.1:{port}/")

@@ -21,7 +21,7 @@ from backend.fusion.samples import (
     ProjectedSample,
     Sample,
 )
-from backend.shell.link.messages import TYPESTORE, AgentStatus, Command, MotionLimits, TrueState
+from backend.shell.link.messages import AgentStatus, Command, MotionLimits, TrueState
 from backend.shell.link.topics import Topic, match, topic
 from backend.spatial.rotation import from_quaternion, to_attitude
 from backend.spatial.types import Array
@@ -61,6 +61,8 @@ def decode(machine: str, suffix: str, payload: bytes, arrival: float) -> Message
 def _message(row: Topic, payload: bytes) -> Any:
     if not 4 < len(payload) <= row.max_bytes:
         raise DecodeError(f"{row.name}: {len(payload)} bytes, allowed are 5 to {row.max_bytes}")
+    from backend.shell.link.typestore import TYPESTORE
+
     return TYPESTORE.deserialize_cdr(payload, row.type)
 
 
@@ -257,6 +259,8 @@ _READERS: dict[str, _Reader] = {
 
 def decode_clock(payload: bytes) -> float:
     """The machine's clock [s] from the answer to a clock query. Raises DecodeError."""
+    from backend.shell.link.typestore import TYPESTORE
+
     try:
         time = TYPESTORE.deserialize_cdr(payload, "builtin_interfaces/msg/Time")
     except Exception as error:

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from backend.fusion.samples import Fix
-from backend.shell.link.messages import TYPESTORE, AgentStatus, Command, MotionLimits, TrueState
+from backend.shell.link.messages import AgentStatus, Command, MotionLimits, TrueState
+from backend.shell.link.typestore import TYPESTORE
 from backend.spatial.types import Array
 
 _Time = TYPESTORE.types["builtin_interfaces/msg/Time"]

@@ -1,15 +1,12 @@
-"""The ROS 2 types in use, the cockpit's own among them, and their records.
+"""The cockpit's own ROS 2 types, and their records.
 
-The standard types are ROS 2 Humble's; what the standard lacks is defined here in ROS's own
-interface language, so that any ROS 2 machine can build the package `cockpit_msgs` from it.
+What the standard lacks is defined here in ROS's own interface language, so that any ROS 2 machine
+can build the package `cockpit_msgs` from it.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
-
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from backend.spatial.types import Array
 
@@ -72,16 +69,6 @@ DEFINITIONS = {
     "cockpit_msgs/msg/AgentStatus": AGENT_STATUS,
     "cockpit_msgs/msg/TrueState": TRUE_STATE,
 }
-
-
-def _typestore() -> Any:
-    store = get_typestore(Stores.ROS2_HUMBLE)
-    for name, text in DEFINITIONS.items():
-        store.register(get_types_from_msg(text, name))
-    return store
-
-
-TYPESTORE: Any = _typestore()
 
 
 @dataclass(frozen=True)

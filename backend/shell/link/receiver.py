@@ -16,6 +16,7 @@ from typing import Any
 
 from backend.errors import InputError
 from backend.fusion.samples import ClockSample, Sample
+from backend.shell.link.access import FOREIGN_KEYS
 from backend.shell.link.codec import DecodeError, decode, decode_clock
 from backend.shell.link.messages import AgentStatus, Command, TrueState
 from backend.shell.link.session import zenoh_congestion, zenoh_priority
@@ -24,7 +25,6 @@ from backend.shell.link.topics import Direction, Topic, key, match, topic
 QUEUE = 8192  # messages: 8 s of four machines at full rate
 POLL_PERIOD = 0.5  # [s] between two questions for a machine's clock
 POLL_TIMEOUT = 1.0  # [s]
-FOREIGN_KEYS = ("*/gnss/*", "*/status")  # slow streams that betray machines the site does not list
 MAX_LABELS = 100
 NOT_FOR_FUSION = ("points",)  # not decoded here
 BESIDE_BYTES = 64 * 2**20  # of messages that are only recorded

@@ -6,11 +6,13 @@ import json
 import re
 import socket
 from collections.abc import Iterable
+from pathlib import Path
 from typing import Any
 
 import zenoh
 
 from backend.errors import InputError
+from backend.shell.link.link_config import check_partners, read_config, stated
 from backend.shell.link.topics import Topic, key, topic
 
 MODES = ("peer", "router")
@@ -43,14 +45,19 @@ def with_port(endpoint: str) -> str:
 
 
 def open_session(
-    listen: Iterable[str] = (), connect: Iterable[str] = (), mode: str = "peer"
+    listen: Iterable[str] = (),
+    connect: Iterable[str] = (),
+    mode: str = "peer",
+    config_file: Path | None = None,
 ) -> Any:
     """An open zenoh.Session that listens on and connects to the given endpoints only.
 
     mode: "peer" talks to whom it is connected; "router" also passes on between its neighbours, as
     a backend does that shares its machines with others. Nothing is searched for by multicast.
-    Endpoints in `connect` may be absent: they are tried again until they are there. Raises
-    InputError for malformed endpoints and for addresses that cannot be listened on.
+    Endpoints in `connect` may be absent: they are tried again until they are there. config_file: a
+    Zenoh configuration that holds where nothing is said here: keys, access control, and endpoints
+    where none are given. Raises InputError for malformed endpoints, for addresses that cannot be
+    listened on, and for a configuration or certificates that cannot be used.
     """
     if mode not in MODES:
         raise InputError(f"mode: {mode!r} is not a mode; allowed are {', '.join(MODES)}")
@@ -77,7 +84,13 @@ def open_session(
         "transport/link/tx/queue/congestion_control/drop/wait_before_drop": 5_000,  # [us]
         "timestamping/enabled": False,  # the messages carry the machines' own stamps
     }
-    config = zenoh.Config()
+    config = zenoh.Config() if config_file is None else read_config(config_file)
+    if config_file is not None:
+        for side, given in (("listen", wanted), ("connect", others)):
+            if not given:
+                del settings[f"{side}/endpoints"]
+                given += [check_endpoint(e, f"{config_file}: {side}") for e in stated(config, side)]
+        check_partners(config_file, config, others)
     for path, value in settings.items():
         config.insert_json5(path, json.dumps(value))
     try:

@@ -16,7 +16,7 @@ import pyarrow.parquet
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 
 from backend.errors import InputError
-from backend.shell.link.messages import TYPESTORE
+from backend.shell.link.typestore import TYPESTORE
 from backend.shell.session.export_rows import TABLES, Rows
 from backend.shell.session.format import SNAPSHOT
 from backend.shell.session.reader import Session

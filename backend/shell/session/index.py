@@ -10,8 +10,6 @@ from typing import Any
 
 from backend.pipeline.config import Config
 from backend.shell.session.cycles import Topics, document
-from backend.shell.session.diff import diff
-from backend.shell.session.evaluate import evaluate
 from backend.shell.session.events import (
     NEAR_MISS,
     Alarms,
@@ -176,6 +174,8 @@ def _index_recorded(tell: Tell, path: Path, topics: Topics, config: Config) -> K
 
 
 def _index_evaluated(tell: Tell, path: Path, topics: Topics, config: Config) -> Known:
+    from backend.shell.session.evaluate import evaluate  # in this job's process only
+
     session = open_session(path)
     milestones = _Milestones(session, tell)
     builder, alarms, others = SeriesBuilder(), Alarms(), gaps(session)
@@ -197,6 +197,8 @@ def _index_evaluated(tell: Tell, path: Path, topics: Topics, config: Config) -> 
 
 
 def _diff(tell: Tell, path: Path, topics: Topics, config: Config) -> dict[str, Any]:
+    from backend.shell.session.diff import diff
+
     session = open_session(path)
     result = diff(session, topics, config, lambda share: tell("progress", share))
     return result.model_dump()

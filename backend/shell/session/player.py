@@ -45,7 +45,8 @@ class Player:
     """The cursor of one session. All methods may be called from any thread.
 
     events: times of what is on the timeline [ns], asked each time; source: "recorded" (as it was)
-    or "evaluated" (as we would judge it now).
+    or "evaluated" (as we would judge it now); wait: called before the source is changed, returns
+    when what judges may be loaded.
     """
 
     def __init__(
@@ -57,6 +58,7 @@ class Player:
         source: str | None = None,
         events: Callable[[], Sequence[int]] = lambda: (),
         clock: Callable[[], float] = clocks.monotonic,
+        wait: Callable[[], None] = lambda: None,
     ) -> None:
         self.sources = sources(session, topics)
         if not self.sources:
@@ -72,8 +74,9 @@ class Player:
         self._session, self._topics, self._config, self._hub = session, topics, config, hub
         self._events = events
         self._clock = clock
+        self._wait = wait
         self._source = source or self.sources[0]
-        self._track: Track = track(self._source, session, topics, config)
+        self._track: Track  # made in the player's own thread: what judges takes long to load
         self._shown: Shown | None = None
         self._cursor = session.begin
         self._playing = False
@@ -160,6 +163,7 @@ class Player:
             log.exception("%s", self.failure)
 
     def _run(self) -> None:
+        self._track = track(self._source, self._session, self._topics, self._config)
         self._seek(self._cursor)
         last = self._clock()
         while not self._stopping.is_set():
@@ -196,6 +200,7 @@ class Player:
             case "seek":
                 self._seek(value)
             case "source":
+                self._wait()
                 self._source = value
                 self._track = track(value, self._session, self._topics, self._config)
                 self._seek(self._cursor)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time as clocks
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Protocol
 
 from backend.fusion.clock import WINDOW
@@ -13,7 +14,6 @@ from backend.pipeline.config import Config
 from backend.pipeline.records import Inputs, Snapshot
 from backend.safety.alarms import OFF_DELAY, ON_DELAY
 from backend.shell.session.cycles import Portion, Topics, document, has_cycles, portions, samples
-from backend.shell.session.evaluate import Evaluator
 from backend.shell.session.format import CLOCK, SNAPSHOT, Message
 from backend.shell.session.reader import Session
 from backend.shell.session.recorded_snapshot import NotASnapshot, recorded_snapshot
@@ -59,8 +59,11 @@ class EvaluatedTrack:
     """The recorded messages, judged by today's pipeline."""
 
     def __init__(self, session: Session, topics: Topics, config: Config) -> None:
+        from backend.shell.session.evaluate import Evaluator  # the whole pipeline, a second
+
         self._session, self._topics, self._config = session, topics, config
-        self._evaluator = Evaluator(config)
+        self._new = partial(Evaluator, config)
+        self._evaluator = self._new()
         self._portions: Iterator[Portion] = iter(())
         self._next: Portion | None = None
 
@@ -73,7 +76,7 @@ class EvaluatedTrack:
 
         Counters begin anew, and so do the times since when alarms hold.
         """
-        self._evaluator = Evaluator(self._config)
+        self._evaluator = self._new()
         start = max(time - WARM, self._session.begin - 1)
         self._portions = portions(self._session, self._topics, start)
         self._next = next(self._portions, None)

@@ -7,8 +7,8 @@ from functools import cache
 from pathlib import Path
 
 from backend.errors import InputError
-from backend.shell.link.messages import TYPESTORE
 from backend.shell.link.topics import match
+from backend.shell.link.typestore import TYPESTORE
 from backend.shell.session.format import (
     CHUNK_BYTES,
     METADATA,

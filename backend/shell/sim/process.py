@@ -6,6 +6,7 @@ import math
 import threading
 import time
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -41,18 +42,20 @@ def run(
     start_at: float | None,
     until: threading.Event,
     skew: float = 0.0,
+    link_config: Path | None = None,
 ) -> None:
     """Simulates the machine `name` of the site until `until` is set.
 
     connect: Zenoh endpoints, which may come and go. start_at: epoch [s] of the schedule's time 0,
     the same for all machines; now when None. skew: of the machine's clock against this computer's
-    [s]. Raises InputError for a bad site, machine or endpoint.
+    [s]. link_config: a Zenoh configuration file. Raises InputError for a bad site, machine or
+    endpoint.
     """
     entry = site.machine(name)
     sidecar = None if entry.sidecar is None else site.folder / entry.sidecar
     machine = load_machine(entry.model, sidecar, site.folder)
     program = load_program(machine, site, name)
-    session = open_session(connect=connect)
+    session = open_session(connect=connect, config_file=link_config)
     try:
         began = time.time() if start_at is None else start_at
         run_machine(site, name, machine, program, session, began, until, skew)
