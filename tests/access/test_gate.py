@@ -210,8 +210,8 @@ def test_the_websocket_knows_the_person(closed: House, monkeypatch: pytest.Monke
 
     known: list[Any] = []
 
-    async def serve(_: Feed, socket: Any) -> None:
-        known.append(socket.state.person)
+    async def serve(_: Feed, socket: Any, person: Any) -> None:
+        known.append(person)
 
     monkeypatch.setattr(Feed, "serve", serve)
     for who in PEOPLE:
