@@ -7,6 +7,7 @@ import { levelShape } from "./glyphs.js";
 import { wallClock } from "./clock.js";
 import { acknowledge, acknowledged, sound } from "./sound.js";
 import { ageLevel, ageText } from "./head.js";
+import * as history from "./alarm_history.js";
 
 let line, detail, age;
 let shape = null;
@@ -50,7 +51,11 @@ function judge() {
   return { level: "CLEAR", line: `CLEAR · ${label(p.a)} ${partName(p.body_a)} ↔ ${label(p.b)} ${partName(p.body_b)} · ${metres(distance)}`, detail: "", key: `clear ${p.body_a} ${p.body_b}` };
 }
 
-export function startAlarm() {
+let send = () => {};
+
+/** give: sends a message to the server. */
+export function startAlarm(give) {
+  send = give;
   line = slowText($("alarm-line"));
   detail = slowText($("alarm-detail"));
   age = slowText($("alarm-age"));
@@ -59,12 +64,13 @@ export function startAlarm() {
 }
 
 export function silenceAlarms() {
+  for (const { name, machine } of alarms().filter((alarm) => !acknowledged(alarm))) if (!replaying()) send({ type: "silence", name, machine });
   acknowledge(alarms());
   update();
 }
 
 export function showList(open) {
-  listOpen = open && alarms().length + notices().length > 0;
+  listOpen = open;
   $("alarm-list").hidden = !listOpen;
   $("alarm-more").setAttribute("aria-expanded", String(listOpen));
   listKey = "";
@@ -89,13 +95,12 @@ export function update() {
   mark(box, "unseen", unseen && severity[now.level] > 0 ? 1 : 0);
   $("alarm-ack").hidden = !unseen || link() === "lost";
   const more = $("alarm-more");
-  more.hidden = !(now.more > 0);
-  write(more, `+${now.more ?? 0}`);
-  more.title = "All alarms and notices";
+  more.hidden = !state.snapshot || (replaying() && !(now.more > 0));
+  write(more, now.more > 0 ? `+${now.more}` : "List");
+  more.title = "All alarms and notices, and those that ended";
   const p = pair(state.own, state.partner);
   sound(present, (p?.approach ?? 0) > 0);
-  if (listOpen && !present.length && !notices().length) showList(false);
-  else list();
+  list();
 }
 
 function list() {
@@ -103,7 +108,8 @@ function list() {
   const s = state.snapshot;
   const present = alarms();
   const told = notices();
-  const key = [...present, ...told].map((a) => a.line).join("|");
+  history.refresh();
+  const key = [...[...present, ...told].map((a) => a.line), history.historyKey()].join("|");
   if (key === listKey) return;
   listKey = key;
   const items = present.map((a) => {
@@ -111,7 +117,9 @@ function list() {
     return make("li", {}, make("b", { "data-level": a.level, text: a.level }), make("span", { text: a.line.replace(/^[A-Z]+ · /, "") }), make("span", { class: "dim", text: `since ${since}` }), make("small", { text: a.detail ?? "" }));
   });
   const said = told.map((n) => make("li", {}, make("b", { "data-level": "NOTICE", text: "NOTICE" }), make("span", { text: n.line }), make("span", { class: "dim", text: Number.isFinite(n.since) ? `since ${wallClock(wall() - (s.time - n.since))}` : "" })));
-  $("alarm-list").replaceChildren(make("ul", {}, ...items, ...said));
+  const past = replaying() ? [] : history.items();
+  const nothing = items.length + said.length + past.length ? [] : [make("li", {}, make("span", {}), make("span", { text: "No alarm so far." }))];
+  $("alarm-list").replaceChildren(make("ul", {}, ...items, ...said, ...past, ...nothing));
 }
 
 /** Of the machine itself: who drives it is no danger it is in. */

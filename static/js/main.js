@@ -108,7 +108,6 @@ function help() {
 
 state.own = sessionStorage.getItem("own") ?? undefined;
 topbar.startTopbar(own);
-alarm.startAlarm();
 startSound();
 demo.startDemo();
 startScene({ keydown: onKey, ...drive.sceneListeners });
@@ -126,6 +125,7 @@ const socket = connect(`${scheme}//${location.host}/ws`, onFrame, (word) => {
   if (word === "open") session.reconnected();
   if (word === "closed") leaveIfSignedOut();
 });
+alarm.startAlarm(socket.send);
 tip.startTip(socket.send);
 ghost.startGhost(socket.send, redraw);
 headers.startHeaders(switchImages);

@@ -61,7 +61,7 @@ function driven(name, parts) {
     parts.level = level;
     parts.delay.replaceChildren(...delayShape(level));
   }
-  return r.mode === "stopped" ? "STOP" : r.holder ? "R" : "M";
+  return consoleOf(name)?.state === "Stop" ? "STOP" : r.holder ? "R" : "M";
 }
 
 function fixWord(fix) {

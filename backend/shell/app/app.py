@@ -13,7 +13,6 @@ from fastapi.staticfiles import StaticFiles
 from fastapi_offline import FastAPIOffline
 from starlette.middleware.trustedhost import TrustedHostMiddleware
 
-from backend.control.person import SUPERVISOR, Person
 from backend.documents.alarms import AlarmsDocument
 from backend.errors import InputError
 from backend.fusion.pose import Validity
@@ -35,10 +34,6 @@ from backend.shell.app.security import SecurityHeaders
 from backend.shell.app.wire import dumps
 
 STATIC = Path(__file__).resolve().parents[3] / "static"
-
-
-LOCAL = Person("local", SUPERVISOR)
-"""Whoever opens the page where nobody signs in."""
 
 
 @dataclass(frozen=True)
@@ -155,7 +150,7 @@ def create_app(
         if not from_here(websocket):
             await websocket.close(code=1008)
             return
-        person = LOCAL if access is None else websocket.scope["state"]["person"]
+        person = None if access is None else websocket.scope["state"]["person"]
         await websocket.accept()
         await feed.serve(websocket, person)
 

@@ -22,8 +22,11 @@ export function consoleOf(name) {
   return all.find((one) => one?.held) ?? null;
 }
 
-/** A stop stands until it is reset. */
-export const latched = () => Object.values(driving()?.machines ?? {}).some((one) => one.mode === "stopped") || Object.values(consoles()).some((one) => one.state === "Stop");
+const stopped = (all) => Object.values(all ?? {}).some((one) => one.state === "Stop");
+
+/** A stop stands until it is reset, by who has the machine. */
+export const latched = () => Object.values(driving()?.seats ?? {}).some((one) => stopped(one.consoles));
+export const mayReset = () => stopped(consoles());
 
 export const pattern = () => (seat()?.pattern === "SAE" ? "SAE" : "ISO");
 export const decision = (name) => (holds(name) ? seat()?.decision?.[name] ?? null : null);

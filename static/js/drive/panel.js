@@ -5,7 +5,7 @@ import { label, state } from "../state.js";
 import { consoleShape } from "../glyphs.js";
 import { widest } from "../headers.js";
 import * as asks from "./asks.js";
-import { controllable, driving, holds, latched, pattern, remote, seat } from "./driving.js";
+import { controllable, driving, holds, latched, mayReset, pattern, remote, seat } from "./driving.js";
 import { neutral } from "./deflection.js";
 import { input, override, stop } from "./operator.js";
 import { levers } from "./levers.js";
@@ -55,7 +55,7 @@ function stopButton() {
   for (const id of ["stop-word", "stop-note"]) $(id).hidden = can;
   $("stop").hidden = !can;
   const on = can && latched();
-  $("reset").hidden = !on;
+  $("reset").hidden = !(can && mayReset());
   mark($("stop"), "latched", on ? 1 : 0);
   mark(document.body, "latched", on ? 1 : 0);
   write($("stop-state"), on ? "STOPPED" : "STOP");

@@ -1,6 +1,6 @@
 // Driving: wires its modules, and its keys.
 
-import { $ } from "../words.js";
+import { $, make } from "../words.js";
 import { state } from "../state.js";
 import { controllable, driving } from "./driving.js";
 import * as asks from "./asks.js";
@@ -56,8 +56,15 @@ export function closeDialogs() {
 /** With every snapshot: what this page had and lost, before the alarms are read. */
 export const seen = loss.update;
 
+/** Who is signed in here, and the way out. */
+function me() {
+  if (!state.you || $("me").childElementCount) return;
+  $("me").replaceChildren(`Signed in as ${state.you.who}, ${state.you.role}. `, make("a", { href: "/login", text: "Sign out" }));
+}
+
 /** Ten times a second. */
 export function update() {
+  me();
   panel.update();
   controls.update();
   editor.update();
