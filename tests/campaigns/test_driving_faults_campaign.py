@@ -20,7 +20,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from live import Backend, all_valid, end, serve, simulated, start
+from live import Backend, all_valid, end, serve, start
 from operators import Operator
 from wiretap import Wiretap
 
@@ -44,17 +44,31 @@ def spread(seconds: list[float]) -> str:
     return f"p50 {1e3 * middle:.0f}, p99 {1e3 * p99:.0f}, max {1e3 * ordered[-1]:.0f} ms"
 
 
+@contextlib.contextmanager
+def machines(*endpoints: str) -> Iterator[None]:
+    """Both simulated machines, connected to every endpoint."""
+    connected = [word for endpoint in endpoints for word in ("--connect", endpoint)]
+    with contextlib.ExitStack() as running:
+        for name in ("left", "right"):
+            running.callback(end, start("sim", "--site", SITE, "--machine", name, *connected))
+        yield
+
+
 @pytest.fixture(scope="module")
-def station() -> Iterator[Backend]:
-    with serve(SITE, "--no-record") as running, simulated(SITE, running.endpoint, "left", "right"):
+def tap() -> Iterator[Wiretap]:
+    """Beside the backend, so that it hears the machines whatever becomes of the backend."""
+    with Wiretap(with_port("tcp/127.0.0.1:0"), "left", listens=True) as listening:
+        yield listening
+
+
+@pytest.fixture(scope="module")
+def station(tap: Wiretap) -> Iterator[Backend]:
+    with (
+        serve(SITE, "--no-record", "--connect", tap.endpoint) as running,
+        machines(running.endpoint, tap.endpoint),
+    ):
         running.wait_for(all_valid)
         yield running
-
-
-@pytest.fixture(scope="module")
-def tap(station: Backend) -> Iterator[Wiretap]:
-    with Wiretap(station.endpoint, "left") as listening:
-        yield listening
 
 
 @pytest.fixture(scope="module")
@@ -65,15 +79,17 @@ def operator(station: Backend) -> Iterator[Operator]:
     opened.close()
 
 
-def moving(operator: Operator, tap: Wiretap, k: int) -> None:
-    """Up and down in turns, away from the partner."""
-    lever = 0.4 if k % 2 else -0.4
+def lever(operator: Operator) -> float:
+    """Of the boom: towards the middle of its travel, so that it never ends."""
+    return 0.4 if operator.joints("left")["boom"] > 0.6 else -0.4
 
+
+def moving(operator: Operator, tap: Wiretap) -> None:
     def going() -> bool:
         return bool(tap.commands) and bool(tap.commands[-1].velocity.any())
 
     operator.move(enable=False, right_y=0.0)
-    operator.drive("left", going, right_y=lever)
+    operator.drive("left", going, right_y=lever(operator))
 
 
 def zero_after(operator: Operator, tap: Wiretap, begun: float) -> float:
@@ -85,8 +101,8 @@ def zero_after(operator: Operator, tap: Wiretap, begun: float) -> float:
 
 def test_dead_man_released(operator: Operator, tap: Wiretap) -> None:
     times = []
-    for k in range(TIMES):
-        moving(operator, tap, k)
+    for _ in range(TIMES):
+        moving(operator, tap)
         begun = time.monotonic()
         operator.move(enable=False)
         times.append(zero_after(operator, tap, begun))
@@ -96,8 +112,8 @@ def test_dead_man_released(operator: Operator, tap: Wiretap) -> None:
 
 def test_input_ceases(operator: Operator, tap: Wiretap) -> None:
     times = []
-    for k in range(TIMES):
-        moving(operator, tap, k)
+    for _ in range(TIMES):
+        moving(operator, tap)
         operator.sending = False
         begun = time.monotonic()
         times.append(zero_after(operator, tap, begun))
@@ -108,8 +124,8 @@ def test_input_ceases(operator: Operator, tap: Wiretap) -> None:
 
 def test_the_backend_stands_still(station: Backend, operator: Operator, tap: Wiretap) -> None:
     times, again = [], 0
-    for k in range(max(TIMES // 5, 1)):
-        moving(operator, tap, k)
+    for _ in range(max(TIMES // 5, 1)):
+        moving(operator, tap)
         time.sleep(0.3)
         station.process.send_signal(signal.SIGSTOP)
         begun = time.monotonic()
@@ -131,7 +147,7 @@ def test_the_backend_stands_still(station: Backend, operator: Operator, tap: Wir
 
 
 def test_tokens_and_replays(operator: Operator, tap: Wiretap) -> None:
-    moving(operator, tap, 0)
+    moving(operator, tap)
     newest = tap.commands[-1]
     begun = time.monotonic()
     operator.move(enable=False)
@@ -168,7 +184,7 @@ def test_pages_that_come_and_go(station: Backend, tap: Wiretap) -> None:
         gone = Operator(station)
         gone.take("left")
         if k % 5 == 0:
-            moving(gone, tap, k)
+            moving(gone, tap)
         gone.close()
         begun = time.monotonic()
         back = Operator(station)
@@ -254,22 +270,7 @@ def test_a_client_that_reads_slowly(station: Backend, operator: Operator) -> Non
 def test_kills_of_the_backend() -> None:
     endpoint, beside = (with_port("tcp/127.0.0.1:0") for _ in range(2))
     stops, backs, rearmed = [], [], 0
-    with Wiretap(beside, "left", listens=True) as tap, contextlib.ExitStack() as machines:
-        for name in ("left", "right"):
-            machines.callback(
-                end,
-                start(
-                    "sim",
-                    "--site",
-                    SITE,
-                    "--machine",
-                    name,
-                    "--connect",
-                    endpoint,
-                    "--connect",
-                    beside,
-                ),
-            )
+    with Wiretap(beside, "left", listens=True) as tap, machines(endpoint, beside):
         for k in range(TIMES):
             begun = time.monotonic()
             with serve(SITE, "--no-record", endpoint=endpoint) as station:
@@ -281,8 +282,7 @@ def test_kills_of_the_backend() -> None:
                 operator = Operator(station)
                 rearmed += operator.machine("left")["holder"] != ""
                 rearmed += tap.speed() > 0.02 and tap.statuses[-1].mode == "remote"
-                lever = 0.4 if k % 2 else -0.4
-                operator.drive("left", lambda: tap.speed() > 0.05, right_y=lever)
+                operator.drive("left", lambda: tap.speed() > 0.05, right_y=lever(operator))
                 time.sleep(0.2)
                 killed = time.monotonic()
                 station.process.send_signal(signal.SIGKILL)
@@ -291,6 +291,7 @@ def test_kills_of_the_backend() -> None:
                     assert time.monotonic() - killed < 5.0, "the machine goes on"
                     time.sleep(0.005)
                 stops.append(tap.stood(killed) - killed)
+                print(f"  kill {k}: stood after {1e3 * stops[-1]:.0f} ms", flush=True)
     show(f"{TIMES} kills of the backend → standstill", "<= 500 ms", spread(stops))
     show("page back", "<= 5 s", spread(backs))
     show("armed by itself", "0", str(rearmed))
