@@ -74,6 +74,7 @@ class Driving:
         self._decisions: dict[str, Decision] = {}
         self._fencing: dict[str, _Fencing] = {}
         self._stopped: dict[str, str] = {}  # machines that nobody has reset since, and why
+        self._refused: set[str] = set()
         self._opened = 0
         self._cycled = clock()
         self._stopping = threading.Event()
@@ -96,6 +97,7 @@ class Driving:
         """A page is gone: what its seat held is given back, and nothing more is sent for it."""
         with self._lock:
             self._seats.pop(name, None)
+            self._refused.discard(name)
         self._leases.drop(name)
 
     def on_message(self, name: str, message: dict[str, Any]) -> bool:
@@ -109,7 +111,7 @@ class Driving:
         if isinstance(said, pages.StopSaid):  # by anybody who is signed in
             self._stop(seat)
         elif not seat.person.may_drive:
-            self._event("refused", seat.person.who, {"said": message["type"]})
+            self._refuse(name, seat, message["type"])
         elif isinstance(said, pages.LeaseSaid):
             self._ask(name, seat, said)
         else:
@@ -222,11 +224,20 @@ class Driving:
         """Latches every seat that holds a machine: whoever sees danger stops what moves."""
         held = self._leases.all()
         with self._lock:
+            news = held.keys() - self._stopped.keys()
             self._stopped |= dict.fromkeys(held, f"{by.person.who} pressed stop")
             for name in {lease.seat for lease in held.values()} & set(self._seats):
                 seat = self._seats[name]
                 self._seats[name] = replace(seat, buttons=replace(seat.buttons, stop=True))
-        self._event("stop", by.person.who, {"role": by.person.role})
+        if news:  # pressed again and again it is one stop
+            details = {"role": by.person.role, "machines": sorted(news)}
+            self._event("stop", by.person.who, details)
+
+    def _refuse(self, name: str, seat: Seat, kind: str) -> None:
+        """Once for a seat: whoever floods it fills no log."""
+        if name not in self._refused:
+            self._refused.add(name)
+            self._event("refused", seat.person.who, {"said": kind, "role": seat.person.role})
 
     def _ask(self, name: str, seat: Seat, said: pages.LeaseSaid) -> None:
         if said.machine not in self._machines:
