@@ -28,6 +28,7 @@ import * as session from "./session.js";
 import * as sheets from "./sheets.js";
 import * as transport from "./transport.js";
 import * as recording from "./recording.js";
+import { recall, startLayout, toggleFullScreen, toggleLayout } from "./layout.js";
 import * as watermark from "./watermark.js";
 import { startSeries } from "./series_pointer.js";
 import { sessionKey } from "./keys.js";
@@ -87,6 +88,8 @@ function onKey(event) {
   else if (event.key === "m" || event.key === "M") toggleSound();
   else if (event.key === "x" || event.key === "X") switchImages();
   else if (event.key === "t" || event.key === "T") plots.plan.turning();
+  else if (event.key === "v" || event.key === "V") toggleLayout();
+  else if (event.key === "f" || event.key === "F") toggleFullScreen();
   else if (sessionKey(event)) event.stopPropagation(); // the scene's own keys would turn its camera
   else if (event.key === "Escape") {
     sheets.close();
@@ -114,10 +117,12 @@ startScene({ keydown: onKey, ...drive.sceneListeners });
 document.addEventListener("keydown", onKey);
 document.addEventListener("keyup", drive.onKeyUp);
 $("help-open").addEventListener("click", help);
-addEventListener("resize", () => {
+startLayout(resized);
+function resized() {
   readSizes();
   for (const s of [...live, ...images]) s.dirty = true;
-});
+}
+addEventListener("resize", resized);
 
 const scheme = location.protocol === "https:" ? "wss:" : "ws:";
 const socket = connect(`${scheme}//${location.host}/ws`, onFrame, (word) => {
@@ -145,6 +150,7 @@ function onFrame(header, arrays) {
     for (const s of [...live, ...images]) s.dirty = true;
   } else if (header.type === "snapshot") {
     drive.seen();
+    recall();
     push(latency.arrival, Date.now() - 1000 * header.wall);
     waitingToDraw = header.wall;
     for (const s of live) s.dirty = true;

@@ -68,7 +68,10 @@ class Cockpit:
         seat = self.driving.open(Person(who, role))
         self.levers[seat] = {
             **dict.fromkeys(LEVERS, 0.0),
-            "enable": False, "focus": True, "gamepad": True, "override": False,
+            "enable": False,
+            "focus": True,
+            "gamepad": True,
+            "override": False,
         }
         return seat
 
