@@ -26,7 +26,8 @@ export function remember() {
   if (s.time - lastHistory >= 0.2 || s.time < lastHistory) {
     lastHistory = s.time;
     const ages = Object.fromEntries(names().map((name) => [name, machine(name)?.ages?.joints ?? null]));
-    state.history.push({ time: s.time, distance, pair: `${state.own} ${state.partner}`, ages });
+    const trip = s.driving?.machines?.[state.own]?.round_trip ?? null;
+    state.history.push({ time: s.time, distance, pair: `${state.own} ${state.partner}`, ages, trip });
     while (state.history.length && state.history[0].time < s.time - HISTORY) state.history.shift();
   }
 

@@ -4,7 +4,7 @@ export const C = {
   page: "#0F1418", panel: "#171D23", text: "#E6EAED", second: "#A9B3BB", line: "#2C3740", edge: "#6E8496",
   free: "#22303A", outside: "#0B0F13", undecided: "#8A949E", grid: "#34434E",
   partner: "#A970F0", partnerLine: "#C9A9F7", site: "#3E8E78", self: "#C0B8D9", people: "#FFFFFF", tipOver: "#79E0B6", slow: "#FFA51F", stop: "#C4262E", stopLine: "#FF6B5E", unknown: "#FF6B5E",
-  stale: "#8A949E", playback: "#C84DAE", playbackLine: "#EC96D7", halo: "#0B0F13",
+  remote: "#4C9BFF", stale: "#8A949E", playback: "#C84DAE", playbackLine: "#EC96D7", halo: "#0B0F13",
 };
 
 const FAMILY = '"Segoe UI", Roboto, "Helvetica Neue", "Liberation Sans", Arial, sans-serif';

@@ -522,6 +522,13 @@ def test_a_locked_machine_is_an_alarm_and_the_delay_has_a_shape(feed: DriveFeed)
     assert len(seen) == 5
 
 
+def test_round_trips_are_a_curve_of_the_last_minute(feed: DriveFeed) -> None:
+    feed.machines["left"] = remote("anna", round_trip=0.18, level="slow")
+    feed.send(lambda: feed.shown("trends").get("trip") == 0.18)
+    feed.machines["left"] = remote("anna", round_trip=None, level="unknown")
+    feed.send(lambda: feed.shown("trends").get("trip") is None)
+
+
 def test_pattern_and_fine_change_only_as_the_server_says(feed: DriveFeed) -> None:
     page = feed.page
     levers = feed.shown("limits")["levers"]

@@ -1,4 +1,4 @@
-// The last 60 s: clearance to the partner, and the age of the joint data of the two machines.
+// The last 60 s: clearance to the partner, the age of the joint data of the two machines, and the own machine's round trip.
 
 import { C, size } from "../theme.js";
 import { metres, number, ticks } from "../axis.js";
@@ -81,12 +81,15 @@ function paint(g, width, height) {
   label(g, "stale 0.2", ages.box.left + 4, y - 2, { halo: true });
   const styles = [[state.own, C.text, 2, null], [state.partner, C.partnerLine, 2, [5, 3]]].filter(([name]) => name);
   for (const [name, colour, w, dash] of [...styles].reverse()) line(g, ages, now, (p) => p.ages[name] ?? OLD, colour, w, dash);
-  legend(g, ages.box.left + 6.6 * t, 1 + 0.55 * t, ages.box.right - ages.box.left - 6.6 * t, styles.map(([name, colour, w, dash]) => [swatches.line(colour, dash, w), nameOf(name)]));
+  const driven = state.history.some((p) => p.trip !== null);
+  if (driven) line(g, ages, now, (p) => p.trip, C.remote, 2, [2, 2]);
+  const trip = driven ? [[swatches.line(C.remote, [2, 2], 2), "round trip"]] : [];
+  legend(g, ages.box.left + 6.6 * t, 1 + 0.55 * t, ages.box.right - ages.box.left - 6.6 * t, [...styles.map(([name, colour, w, dash]) => [swatches.line(colour, dash, w), nameOf(name)]), ...trip]);
   const last = state.history[state.history.length - 1];
   const age = snapshotAge();
   const known = state.history.map((p) => p.distance).filter((d) => d !== null);
   return {
-    state: { own: state.own, partner: state.partner, points: state.history.length, clearance: last?.distance ?? null, ages: last?.ages ?? {} },
+    state: { own: state.own, partner: state.partner, points: state.history.length, clearance: last?.distance ?? null, ages: last?.ages ?? {}, trip: last?.trip ?? null },
     age,
     label: `Clearance over 60 s: now ${last?.distance === null || !last ? "unknown" : metres(last.distance)}, least ${known.length ? metres(Math.min(...known)) : "unknown"}; ${ageText(age)}`,
   };
@@ -101,6 +104,7 @@ function probe(x, y) {
   const lines = [`${number(now - p.time, 1)} s ago`];
   if (hit.unit === "m") lines.push(`clearance ${p.distance === null ? "unknown" : metres(p.distance)}`);
   else for (const [name, age] of Object.entries(p.ages)) lines.push(`${nameOf(name)} joints ${age === null ? "never received" : `${number(age * 1000, 0)} ms old`}`);
+  if (hit.unit !== "m" && p.trip !== null) lines.push(`${nameOf(state.own)} commands ${number(p.trip * 1000, 0)} ms there and back`);
   return lines;
 }
 
