@@ -20,6 +20,7 @@ class Evaluator:
 
     def __init__(self, config: Config) -> None:
         self._config = config
+        self._unseen = replace(config, margins=False)
         self._state: State | None = None
         self._aside: list[Inputs] = []
 
@@ -28,8 +29,12 @@ class Evaluator:
         self._begin(portion)
         self._aside.append(portion.inputs)
 
-    def step(self, portion: Portion) -> Snapshot:
-        """One cycle with this portion and all that was put aside."""
+    def step(self, portion: Portion, seen: bool = True) -> Snapshot:
+        """One cycle with this portion and all that was put aside.
+
+        seen: somebody looks at the snapshot; margins are for looking only, and no later cycle
+        depends on them.
+        """
         state = self._begin(portion)
         inputs = portion.inputs
         if self._aside:
@@ -37,7 +42,9 @@ class Evaluator:
             self._aside.clear()
         if portion.cycle is not None and portion.cycle != state.cycle:
             state = replace(state, cycle=portion.cycle)
-        self._state, snapshot = step(state, inputs, portion.now, self._config)
+        self._state, snapshot = step(
+            state, inputs, portion.now, self._config if seen else self._unseen
+        )
         return snapshot
 
     def _begin(self, portion: Portion) -> State:

@@ -92,7 +92,7 @@ class EvaluatedTrack:
         for left, portion in zip(range(len(before_it), 0, -1), before_it, strict=True):
             settles = portion.time > time - SETTLE and left % SETTLE_EVERY == 0
             if left <= EXACT or settles:
-                shown = Shown(portion.time, self._evaluator.step(portion))
+                shown = Shown(portion.time, self._evaluator.step(portion, seen=left == 1))
             else:
                 self._evaluator.put_aside(portion)
         return shown
