@@ -5,11 +5,28 @@ from __future__ import annotations
 import contextlib
 import os
 import sys
+import threading
 import webbrowser
 
 from backend.shell.access.access import Access
+from backend.shell.priority import AFTER, set_niceness
 from backend.site.site import Site
 from cockpit.entry import Entry, link
+
+
+def _open(url: str) -> bool:
+    """A browser goes after what moves machines: it is started by a thread that does so, too."""
+    opened: list[bool] = []
+
+    def run() -> None:
+        set_niceness(AFTER)
+        with contextlib.suppress(webbrowser.Error):
+            opened.append(webbrowser.open(url))
+
+    thread = threading.Thread(target=run, name="browser")
+    thread.start()
+    thread.join()
+    return any(opened)
 
 
 def announce(site: Site, entry: Entry, access: Access, port: int, open_browser: bool) -> None:
@@ -28,7 +45,6 @@ def announce(site: Site, entry: Entry, access: Access, port: int, open_browser: 
     )
     opened = False
     if has_screen:
-        with contextlib.suppress(webbrowser.Error):
-            opened = webbrowser.open(url)
+        opened = _open(url)
     if not opened:
         print(f"No browser could be opened here: open {url} yourself.", flush=True)

@@ -15,7 +15,7 @@ from pathlib import Path
 from backend.errors import InputError
 from backend.machine.model import Machine
 from backend.shell.link.session import with_port
-from backend.shell.priority import FIRST, set_niceness
+from backend.shell.priority import going_first
 from backend.site.site import Site, load_site
 from cockpit.announce import announce
 from cockpit.entry import Entry
@@ -28,6 +28,7 @@ SETTLE = 6.0
 """Seconds between starting the simulated machines and the beginning of their programs."""
 
 
+@going_first()
 def run_demo(
     site_name: str,
     entry: Entry,
@@ -41,7 +42,6 @@ def run_demo(
     from cockpit.options import Options
     from cockpit.station import Station
 
-    set_niceness(FIRST)
     site = load_site(site_name)
     endpoint = with_port(LOOPBACK)
     began = [float("inf")]
@@ -73,6 +73,7 @@ def tells_a_story(site: Site) -> bool:
     return any("script" in machine.sim.details for machine in site.machines)
 
 
+@going_first()
 def run_serve(
     site_name: str,
     entry: Entry,
@@ -90,7 +91,6 @@ def run_serve(
     from cockpit.options import Options
     from cockpit.station import Station
 
-    set_niceness(FIRST)
     site = load_site(site_name)
     listen = listen or site.link.listen
     if not (listen or connect or site.link.connect or link_config):
@@ -108,6 +108,7 @@ def run_serve(
         until.wait()
 
 
+@going_first()
 def run_sim(
     site_name: str,
     machine: str,
@@ -119,12 +120,12 @@ def run_sim(
     """One simulated machine, until interrupted."""
     from backend.shell.sim.process import run
 
-    set_niceness(FIRST)
     site = load_site(site_name)
     site.machine(machine)
     run(site, machine, _partners(connect, link_config), start_at, until, link_config=link_config)
 
 
+@going_first()
 def run_agent(
     site_name: str,
     machine: str,
@@ -150,7 +151,6 @@ def run_agent(
         interface, channel, bitrate, dbc = can
         return CanDriver(description, open_bus(interface, channel, bitrate), clock, dbc or DBC)
 
-    set_niceness(FIRST)
     site = load_site(site_name)
     site.machine(machine)
     run(site, machine, _partners(connect, link_config), until, make, link_config)

@@ -7,13 +7,28 @@ from __future__ import annotations
 
 import contextlib
 import os
+from collections.abc import Iterator
 
 FIRST = -10
 """Niceness of processes that a machine's motion depends on, a browser on the same computer after
 them."""
+
+AFTER = 0
+"""Of everything that nobody said anything about."""
 
 
 def set_niceness(value: int) -> None:
     """Of this process, before it starts threads, which inherit it."""
     with contextlib.suppress(OSError, AttributeError):
         os.setpriority(os.PRIO_PROCESS, 0, value)
+
+
+@contextlib.contextmanager
+def going_first() -> Iterator[None]:
+    """This process goes before others until the end of the block."""
+    before = os.getpriority(os.PRIO_PROCESS, 0) if hasattr(os, "getpriority") else 0
+    set_niceness(FIRST)
+    try:
+        yield
+    finally:
+        set_niceness(before)
