@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from rich.console import Console
 from rich.progress import Progress
 
+from backend.control.person import Person
 from backend.errors import InputError
 from backend.machine.load import load_machine
 from backend.machine.model import Machine
@@ -32,6 +33,14 @@ if TYPE_CHECKING:
 MAX_HEIGHT = 50.0  # of a picked bucket tip above or below the swing joint [m]
 _LOOPS = (("images", (SUN, EXACT), "image_hz"), ("zones", (ZONE, REGIONS), "zone_hz"))
 """Name, kinds, and which of the site's rates; each loop has a process of its own."""
+
+SHARED = frozenset({"marker", "silence", "tip_height", "playback"})
+"""Kinds of messages that change what others see; the rest is of the page that sends it."""
+
+
+def may_say(message: dict[str, Any], person: Person | None) -> bool:
+    """Whether a page's message is obeyed: who only looks changes nothing that others see."""
+    return message.get("type") not in SHARED or (person is not None and person.may_drive)
 
 
 def load_models(site: Site) -> dict[str, Machine]:

@@ -36,7 +36,7 @@ from backend.shell.session.player import MODE, Player
 from backend.shell.session.reader import Session, open_session
 from backend.shell.session.ring import parts_of, pins_of, recordings_of
 from backend.site.site import Site, load_site, parse_site, shipped_sites
-from cockpit.desk import Desk, image_loops, load_models, make_config
+from cockpit.desk import Desk, image_loops, load_models, make_config, may_say
 from cockpit.entry import Entry
 from cockpit.foreign import as_session
 from cockpit.resolutions import resolutions
@@ -295,7 +295,8 @@ class PlaybackStation:
         """What a page asks of playback or of the scene. Anything else, commands included, ends
         here: there is nobody whom it could reach.
         """
-        del person
+        if not may_say(message, person):
+            return
         if message.get("type") == "playback":
             with contextlib.suppress(InputError):
                 self.player.do(message.get("do"), message.get("value"))

@@ -31,7 +31,7 @@ from backend.shell.link.source import LinkSource
 from backend.shell.runner import Runner
 from backend.shell.session.recorder import Recorder
 from backend.site.site import Site
-from cockpit.desk import Desk, image_loops, load_models, make_config
+from cockpit.desk import Desk, image_loops, load_models, make_config, may_say
 from cockpit.driving import make_driving
 from cockpit.options import Options
 from cockpit.recording import make_recorder, recording_sources, site_folder
@@ -211,6 +211,8 @@ class Station:
 
     def _on_message(self, message: dict[str, Any], person: Person | None) -> None:
         """What a page asks of the recording, of alarms, or of the scene and the images."""
+        if not may_say(message, person):
+            return
         if message.get("type") == "marker":
             with contextlib.suppress(InputError):
                 self.recorder.mark("note", str(message.get("text", "")))
