@@ -1,9 +1,15 @@
 // Per joint and direction of a machine, the smallest allowed share of full speed, and in which words. Advice only.
 
-import { described, machine, silence, state, sunMap, swingSign } from "../state.js";
+import { described, machine, severity, silence, state, sunMap, swingSign } from "../state.js";
 
 // Words for a lowering and a raising motion in Sun's sense (positive raises).
 const WORDS = { boom: ["down", "up"], stick: ["in", "out"], bucket: ["curl", "dump"], tilt: ["left", "right"], rotate: ["left", "right"], travel: ["back", "ahead"] };
+
+/** The severest level of a machine's concerns. */
+export function worstLevel(name) {
+  const levels = (state.snapshot?.concerns ?? []).filter((c) => c.machine === name).map((c) => severity[c.level] ?? 0);
+  return Object.keys(severity)[Math.max(0, ...levels)];
+}
 
 /** [{role, sides: [{word, allowed, why}, ..]}]: each joint's two directions, `share(role, index, positive)` says {allowed, why}. */
 export function directions(name, share) {

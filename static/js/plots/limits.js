@@ -3,11 +3,11 @@
 import { C, size } from "../theme.js";
 import { clear, label, message, segment } from "../pen.js";
 import { $ } from "../words.js";
-import { label as nameOf, severity, snapshotAge, state } from "../state.js";
+import { label as nameOf, snapshotAge, state } from "../state.js";
 import { surface } from "../surface.js";
 import { ageText } from "../head.js";
 import { controllable } from "../drive/driving.js";
-import { advice } from "./advice.js";
+import { advice, worstLevel } from "./advice.js";
 import { arrow, isBlocked, isFree, shareText } from "./arrow.js";
 import * as sticks from "./sticks.js";
 
@@ -40,9 +40,8 @@ function paint(g, width, height) {
       cells.push({ x0: x, x1: x + column, y0: y - pitch / 2, y1: y + pitch / 2, role, ...one });
     });
   });
-  const worst = Math.max(0, ...(state.snapshot.concerns ?? []).filter((c) => c.machine === state.own).map((c) => severity[c.level] ?? 0));
   return {
-    state: { own: state.own, enforced: false, level: Object.keys(severity)[worst], allowed: Object.fromEntries(rows.map((r) => [r.role, Object.fromEntries(r.sides.map((s) => [s.word, Math.round(100 * s.allowed)]))])) },
+    state: { own: state.own, enforced: false, level: worstLevel(state.own), allowed: Object.fromEntries(rows.map((r) => [r.role, Object.fromEntries(r.sides.map((s) => [s.word, Math.round(100 * s.allowed)]))])) },
     age,
     label: `Advice for ${nameOf(state.own)}, not enforced: ${rows.flatMap((r) => r.sides.filter((s) => !isFree(s.allowed)).map((s) => `${r.role} ${s.word} ${isBlocked(s.allowed) ? "blocked" : `${Math.round(100 * s.allowed)} %`}`)).join(", ") || "all free"}; ${ageText(age)}`,
   };

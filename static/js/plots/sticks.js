@@ -8,6 +8,7 @@ import { input, slots } from "../drive/operator.js";
 import { holds, pattern, seat } from "../drive/driving.js";
 import { levers } from "../drive/levers.js";
 import { mapping } from "../drive/store.js";
+import { worstLevel } from "./advice.js";
 import { arrow, isBlocked, isFree, percent, shareText } from "./arrow.js";
 
 const WAYS = ["up", "left", "right", "down"];
@@ -114,7 +115,7 @@ export function paint(g, width, height) {
   const shown = (one) => [`${one.joint} ${one.word}`, isBlocked(one.allowed) ? 0 : Math.round(100 * one.allowed)];
   const restricted = all.filter((one) => !isFree(one.allowed));
   return {
-    state: { own: state.own, sticks: true, enforced, pattern: pattern(), sent, applied, levers: Object.fromEntries(all.map((one) => [`${one.lever} ${one.way}`, shown(one)])) },
+    state: { own: state.own, sticks: true, enforced, level: worstLevel(state.own), pattern: pattern(), sent, applied, levers: Object.fromEntries(all.map((one) => [`${one.lever} ${one.way}`, shown(one)])) },
     age,
     label: `Sticks, pattern ${pattern()}, limits ${enforced ? "enforced" : "not enforced"}: ${restricted.map((one) => `${one.joint} ${one.word} ${shareText(one.allowed)}`).join(", ") || "all free"}; ${ageText(age)}`,
   };
