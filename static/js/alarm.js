@@ -60,7 +60,7 @@ export function startAlarm(give) {
   detail = slowText($("alarm-detail"));
   age = slowText($("alarm-age"));
   $("alarm-ack").addEventListener("click", silenceAlarms);
-  $("alarm-more").addEventListener("click", () => showList(!listOpen));
+  for (const id of ["alarm-more", "alarm-words"]) $(id).addEventListener("click", () => showList(!listOpen));
 }
 
 export function silenceAlarms() {
@@ -95,7 +95,8 @@ export function update() {
   mark(box, "unseen", unseen && severity[now.level] > 0 ? 1 : 0);
   $("alarm-ack").hidden = !unseen || link() === "lost";
   const more = $("alarm-more");
-  more.hidden = !state.snapshot || (replaying() && !(now.more > 0));
+  // Calm, there is room for it; an alarm needs the line, which opens the list, too.
+  more.hidden = !(now.more > 0) && (now.level !== "CLEAR" || !state.snapshot || replaying());
   write(more, now.more > 0 ? `+${now.more}` : "List");
   more.title = "All alarms and notices, and those that ended";
   const p = pair(state.own, state.partner);

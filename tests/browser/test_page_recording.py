@@ -136,4 +136,4 @@ def test_a_notice_never_hides_an_alarm(feed: Feed) -> None:
         pairs=[{**unknown, "points": None, "reason": "RIGHT is silent", "approach": 0.0}],
     )
     feed.send(lambda: feed.level() == "CLEAR" and line.inner_text() == CALM)
-    assert feed.page.inner_text("#alarm-more") == "List"  # nothing more than what is shown
+    assert feed.page.inner_text("#alarm-more") == "List"  # calm: what ended is behind it

@@ -25,7 +25,7 @@ def test_metrics_by_token_and_json_lines_on_stderr(tmp_path: Path) -> None:
     arguments = [
         *("serve", "--site", "demo", "--no-browser", "--port", "0", "--no-record"),
         *("--listen", "tcp/127.0.0.1:0", "--metrics-token-file", str(token)),
-        *("--log-json", "--log-level", "info"),
+        *("--log-json", "--log-level", "info", "--one-time-link"),
     ]
     with log.open("w") as stderr:
         process = subprocess.Popen(
@@ -68,7 +68,8 @@ def test_mistakes_are_one_sentence(tmp_path: Path) -> None:
         (("--metrics-token-file", str(tmp_path / "none")), "cannot be read"),
         (("--link-config", str(tmp_path / "none.json5")), "cannot be read"),
     ):
-        done = cockpit("serve", "--site", "demo", "--no-browser", "--port", "0", *arguments)
+        start = "serve", "--site", "demo", "--no-browser", "--port", "0", "--one-time-link"
+        done = cockpit(*start, *arguments)
         assert done.returncode == 2
         assert words in done.stderr
         assert done.stderr.count("\n") == 1
