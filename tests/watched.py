@@ -30,7 +30,7 @@ class Watched:
         self.page.on("pageerror", lambda error: self.errors.append(str(error)))
         self.page.on("console", lambda m: self.errors.append(m.text) if m.type == "error" else None)
         self.page.goto(url)
-        self.until("document.body.dataset.ready === '1'", 60.0)
+        self.until("document.body.dataset.ready === '1'", 120.0)
 
     def until(self, condition: str, timeout: float = 30.0) -> None:
         """Waits for a JavaScript condition. (The page's policy forbids Playwright's own wait.)"""

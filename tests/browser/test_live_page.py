@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import io
-import signal
 import time
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
-from live import Backend, all_valid, backend, serve, simulate, simulated
+from live import Backend, all_valid, backend
 from PIL import Image
 from watched import CANVASES, SIZES, Watch
 
@@ -85,35 +84,6 @@ def test_the_3d_scene_shows_the_machines(moving: Backend, watch: Watch) -> None:
         pixels = np.asarray(picture.convert("RGB"), dtype=int)
         # Machine yellow is the only warm colour of a calm scene; what is stale is grey.
         warm = int(((pixels[..., 0] > pixels[..., 2] + 25) & (pixels[..., 0] > 60)).sum())
-
-
-def test_a_killed_machine_is_stale_on_the_page_and_recovers(watch: Watch) -> None:
-    site = "demo"
-    with serve(site) as station, simulated(site, station.endpoint, "left", "right") as processes:
-        station.wait_for(all_valid)
-        watched = watch(station.url, SIZES[1])
-        page = watched.page
-        # Every snapshot that reaches the page is kept with what the page makes of it.
-        page.evaluate(
-            """() => { window.kept = []; const look = () => {
-              const s = window.cockpit.state.snapshot;
-              if (s && window.kept.at(-1)?.cycle !== s.cycle) window.kept.push({cycle: s.cycle,
-                age: s.machines.right.ages.joints, validity: s.machines.right.validity});
-              setTimeout(look, 5); }; look(); }"""
-        )
-        processes["right"].send_signal(signal.SIGKILL)
-        watched.until("window.kept.at(-1).validity !== 'VALID'", 10.0)
-        kept = page.evaluate("window.kept")
-        assert all(k["validity"] != "VALID" for k in kept if k["age"] > 0.2)
-        watched.until(
-            "document.getElementById('alarm-line').textContent.startsWith('UNKNOWN · RIGHT')"
-            " && JSON.parse(document.getElementById('plan').dataset.state).nearest === null"
-            " && !document.getElementById('alarm').textContent.includes('CLEAR')"
-        )
-        processes["right"].wait()
-        processes["right"] = simulate(site, "right", station.endpoint)
-        watched.until("window.cockpit.state.snapshot.machines.right.validity === 'VALID'", 40.0)
-        assert watched.errors == []
 
 
 def test_a_reconnecting_page_is_current_within_two_seconds(moving: Backend, watch: Watch) -> None:
