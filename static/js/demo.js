@@ -1,7 +1,8 @@
 // The demo's first minute: a card, then short callouts at what is happening.
 
 import { $, mark, write } from "./words.js";
-import { metres } from "./axis.js";
+import { metres, number } from "./axis.js";
+import { controllable, holds } from "./drive/driving.js";
 import { exactImage, label, state } from "./state.js";
 
 const CARD_UNTIL = 20; // s; who opens the page later is not greeted
@@ -16,17 +17,28 @@ const SCRIPT = [
   [8, "reach-panel", (own) => `★ is ${own}'s arm now`],
   [15, "plan-panel", () => "Purple: where they would meet, ten times a second"],
   [22, "limits-panel", () => "SLOW at 0.8 m: only the levers that approach"],
-  [28, "alarm-line", () => "STOP level at 0.2 m"],
+  [28, "alarm-line", () => (Number.isFinite(closing()) ? `Not braking: contact in ${number(closing(), 1)} s (computed)` : "STOP level at 0.2 m")],
   [34, "limits-panel", () => "Away is always free"],
   [42, "slices", () => (exactImage() ? "What if? Click a cell: checked independently" : "Point at a cell: its angles, and what is met")],
   [50, "machines", () => "No data is never “safe”"],
-  [57, "alarm-line", () => `Contacts ${state.contacts}, closest approach ${metres(state.closest)}`],
+  [57, "alarm-line", (own) => `Contacts ${state.contacts}, closest approach ${metres(state.closest)}${controllable(state.own) && !holds(state.own) ? `. R: drive ${own}` : ""}`],
 ];
 
-export function startDemo() {
+/** Of the own machine's bodies with the partner's at present speeds [s]. */
+const closing = () => {
+  const times = (state.snapshot?.concerns ?? []).filter((c) => c.machine === state.own).map((c) => c.evidence?.time_to_contact);
+  return Math.min(...times.filter((t) => Number.isFinite(t) && t < 20));
+};
+
+export function startDemo(drive) {
   $("demo-watch").addEventListener("click", () => {
     watching = true;
     $("demo-card").hidden = true;
+  });
+  $("demo-drive").addEventListener("click", () => {
+    dismissed = true;
+    drive();
+    update();
   });
   $("demo-skip").addEventListener("click", () => {
     dismissed = true;
@@ -67,6 +79,9 @@ export function update() {
   if (elapsed < CARD_UNTIL && !watching) {
     const soon = Math.max(0, Math.round((22 - elapsed) / 5) * 5);
     write($("demo-text"), `Two excavators share one site. Purple is where ${own} would hit ${partner}. ${soon ? `In ${soon} s they get too close.` : "They get too close now."}`);
+    const drivable = controllable(state.own) && !holds(state.own);
+    $("demo-drive").hidden = !drivable;
+    if (drivable) write($("demo-drive"), `Drive ${own}`);
     card.hidden = false;
   } else card.hidden = true;
   if (finished) return;

@@ -112,7 +112,7 @@ function help() {
 state.own = sessionStorage.getItem("own") ?? undefined;
 topbar.startTopbar(own);
 startSound();
-demo.startDemo();
+demo.startDemo(drive.request);
 startScene({ keydown: onKey, ...drive.sceneListeners });
 document.addEventListener("keydown", onKey);
 document.addEventListener("keyup", drive.onKeyUp);

@@ -62,7 +62,6 @@ class Cockpit:
         self.level, self.allowed = Level.CLEAR, 1.0
         self.levers: dict[str, dict[str, Any]] = {}
         self.sequence = 0
-        self._leases = leases
 
     def sit(self, role: str = OPERATOR, who: str = "ann") -> str:
         seat = self.driving.open(Person(who, role))
@@ -80,7 +79,7 @@ class Cockpit:
 
     def run(self, cycles: int = 5, period: float = 0.02) -> None:
         for _ in range(cycles):
-            self.radio.run(period, self._leases)
+            self.radio.run(period, self.driving)
             for seat, levers in self.levers.items():
                 self.sequence += 1
                 self.say(seat, "sticks", seq=self.sequence, **levers)
@@ -132,6 +131,16 @@ def test_sticks_become_commands_with_the_lease_s_token(cockpit: Cockpit) -> None
     # Before the dead-man everything that was sent was zero.
     first = next(k for k, (d, _, _) in enumerate(cockpit.outlet.sent) if d.joints.any())
     assert first > 5
+
+
+def test_leases_end_by_themselves_when_driving_has_failed(cockpit: Cockpit) -> None:
+    seat = cockpit.sit()
+    cockpit.drive(seat)
+    cockpit.radio.run(4.0, cockpit.driving)  # a stall: the machine stands, the lease is kept
+    assert cockpit.driving.driven() == ("left",)
+    cockpit.radio.run(3.0, cockpit.driving)
+    assert cockpit.driving.driven() == ()
+    assert not cockpit.radio.lease.held(cockpit.radio.now)
 
 
 def test_without_a_lease_nothing_is_sent(cockpit: Cockpit) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import heapq
 import random
 from collections.abc import Callable
+from typing import Protocol
 
 import pytest
 
@@ -14,6 +15,10 @@ from backend.shell.driving.leases import NO_ANSWER, REFRESH, Leases
 
 ANN, BOB = Person("ann", "operator"), Person("bob", "operator")
 SUE = Person("sue", "supervisor")
+
+
+class Refreshing(Protocol):
+    def refresh(self) -> None: ...
 
 
 class Radio:
@@ -48,7 +53,7 @@ class Radio:
         heapq.heappush(self._due, (self.now + seconds, self._count, do))
 
     def run(
-        self, seconds: float, *cockpits: Leases, each: Callable[[], None] = lambda: None
+        self, seconds: float, *cockpits: Refreshing, each: Callable[[], None] = lambda: None
     ) -> None:
         end = self.now + seconds
         while self.now < end:

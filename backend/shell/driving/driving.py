@@ -36,6 +36,9 @@ MOST_UP = 1.0
 LATE = 0.4
 """A cycle that comes later than this after the last pauses whatever moves: it stood already [s]."""
 
+FAILED = 5.0
+"""Without a cycle for longer than this, driving has failed: its leases are left to end [s]."""
+
 Event = Callable[[str, str, dict[str, Any]], None]
 """Told what happened ("lease", "console", "stop", ...), who did it, and details."""
 
@@ -218,6 +221,11 @@ class Driving:
 
     def _refresh(self) -> None:
         while not self._stopping.wait(REFRESH / 3.0):
+            self.refresh()
+
+    def refresh(self) -> None:
+        """Keeps what is held, as long as commands can come of it."""
+        if self._clock() - self._cycled <= FAILED:
             self._leases.refresh()
 
     def _stop(self, by: Seat) -> None:

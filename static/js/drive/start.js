@@ -25,7 +25,7 @@ export function startDriving(give) {
 /** Of the window of the scene, besides its keys. */
 export const sceneListeners = { keyup: onKeyUp, focus: enterScene, blur: leaveScene };
 
-export const { chosen } = asks;
+export const { chosen, request } = asks;
 
 /** True when the key was meant for a machine. Text fields and dialogs keep theirs. */
 export function driveKey(event) {
