@@ -50,7 +50,8 @@ def _words(document: GaugeDocument) -> str:
         )
     for feature in document.features[:MOST]:
         kind = feature.kind or "feature"
-        lines.append(f'{kind} "{feature.name}": {feature.length:.3f} m')
+        points = f", {len(feature.points)} points" if feature.points else ""
+        lines.append(f'{kind} "{feature.name}": {feature.length:.3f} m{points}')
     lines += _more(len(document.features), "features")
     for network in document.networks:
         lines += _network(network)

@@ -69,6 +69,7 @@ def _layers(model: Model) -> list[tuple[str, str, Array]]:
     for feature in model.features:
         kind = "cable" if feature.kind == "cable" else "feature"
         layers += [(kind, feature.name, line[:, :2]) for line in feature.lines]
+        layers += [(kind, feature.name, point[None, :2]) for point in feature.points]
     for alignment in model.alignments:
         count = max(2, min(4000, 1 + int(alignment.length / 0.5)))
         s = np.union1d(np.linspace(0.0, alignment.length, count), alignment.starts)

@@ -104,7 +104,8 @@ class FeatureModel(BaseModel):
     kind: str
     state: str
     lines: list[list[list[float | None]]] = Field(description="of [east, north, height] [m]")
-    length: float = Field(description="in plan [m]")
+    points: list[list[float | None]] = Field(description="[east, north, height] [m]")
+    length: float = Field(description="of its lines, in plan [m]")
     properties: dict[str, str]
 
 
@@ -288,6 +289,7 @@ def _feature(f: Feature) -> FeatureModel:
         kind=f.kind,
         state=f.state,
         lines=[_rows(line) for line in f.lines],
+        points=_rows(f.points),
         length=f.length,
         properties=f.properties,
     )

@@ -14,7 +14,7 @@ from backend.gauge.profile import Profile
 from backend.gauge.stations import Stations
 from backend.spatial.types import Array
 
-_END = 1e-6  # how far beyond an element's end it is still continued [m]
+_END = 1e-3  # beyond an element by less, its end is meant: files round to millimetres [m]
 
 
 @dataclass(frozen=True)

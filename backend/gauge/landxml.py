@@ -69,6 +69,7 @@ class _Reader:
         self._format = ""
         self._crs = ("", "", "")
         self._points: dict[str, Array] = {}
+        self._groups: list[list[Array]] = []  # of points, one for each <CgPoints> that is open
         self._surface: SurfaceReader | None = None
         self._alignments: list[Alignment] = []
         self._surfaces: list[Surface] = []
@@ -82,6 +83,7 @@ class _Reader:
             "Project": self._read_project,
             "FeatureDictionary": self._read_dictionary,
             "CgPoint": self._read_point,
+            "CgPoints": self._read_group,
             "Alignment": self._read_alignment,
             "Surface": self._read_surface,
             "PlanFeature": self._read_feature,
@@ -95,6 +97,8 @@ class _Reader:
             self._depth += 1
             if self._depth == 1:
                 self._root(element)
+            elif name == "CgPoints":
+                self._groups.append([])
             elif name == "Surface":
                 self._surface = SurfaceReader(self.units, self._file)
             return
@@ -119,6 +123,7 @@ class _Reader:
 
     def finish(self, epsg: int | None) -> Model:
         """The model at the end of the document."""
+        self._log.settle_directions()
         code, name, heights = self._crs
         crs, conflicts = resolve(code, name, heights, epsg, self._extent())
         for c in conflicts:
@@ -199,16 +204,36 @@ class _Reader:
 
     def _read_point(self, element: Any) -> None:
         name = xml.clean(element.get("name"))
-        if not name or not (element.text or "").strip():
-            return
+        if not (element.text or "").strip():
+            return  # refers to another
         if len(self._points) >= MAX_NAMED_POINTS:
             raise InputError(
                 f"{self._file}: has more than {MAX_NAMED_POINTS} named points; allowed are fewer."
             )
         try:
-            self._points[name] = xml.point(element.text, self.units)
+            point = xml.point(element.text, self.units)
         except ValueError as error:
             self._log.skip(xml.called(element), str(error))
+            return
+        self._points[name or f"line {element.sourceline}"] = point
+        if self._groups:
+            self._groups[-1].append(point)
+
+    def _read_group(self, element: Any) -> None:
+        """Surveyed points, such as light poles; groups within groups are features of their own."""
+        points = self._groups.pop()
+        if not points:
+            return
+        self._features.append(
+            Feature(
+                name=xml.clean(element.get("name")),
+                kind="points",
+                points=np.array(points),
+                description=xml.clean(element.get("desc")),
+                state=xml.clean(element.get("state")),
+                properties=xml.properties(element),
+            )
+        )
 
     def _read_alignment(self, element: Any) -> None:
         made = read_alignment(
@@ -243,7 +268,8 @@ class _Reader:
         """A few points (n, 2) of what was read."""
         found = [a.elements[0].start for a in self._alignments]
         found += [s.points[0, :2] for s in self._surfaces if len(s.points)]
-        found += [f.lines[0][0, :2] for f in self._features]
+        found += [f.lines[0][0, :2] for f in self._features if f.lines]
+        found += [f.points[0, :2] for f in self._features if len(f.points)]
         found += [n.structures[0].center[:2] for n in self._networks if n.structures]
         return np.array(found).reshape(-1, 2)
 

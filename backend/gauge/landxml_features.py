@@ -27,6 +27,7 @@ def read_feature(
     """One <PlanFeature>: its geometry as polylines, or its location; None when it has neither."""
     where = xml.called(element)
     lines: list[Array] = []
+    single: list[Array] = []
     for geometry in xml.children(element, "CoordGeom"):
         reader = PlanReader(units, points, log)
         for item in geometry:
@@ -35,17 +36,20 @@ def read_feature(
                 _append(lines, _sampled(*made))
     for item in xml.children(element, "Location", "PntList2D", "PntList3D"):
         try:
-            found = xml.point(item.text, units)[None] if xml.local(item) == "Location" else None
-            lines.append(xml.points(item, units) if found is None else found)
+            if xml.local(item) == "Location":
+                single.append(xml.point(item.text, units))
+            else:
+                lines.append(xml.points(item, units))
         except ValueError as error:
             log.skip(f"{where} / {xml.called(item)}", str(error))
-    if not lines:
+    if not lines and not single:
         log.skip(where, "it has no line and no location that could be read")
         return None
     return Feature(
         name=xml.clean(element.get("name")),
         kind=_kind(element),
         lines=tuple(lines),
+        points=np.array(single).reshape(-1, 3),
         description=xml.clean(element.get("desc")),
         state=xml.clean(element.get("state")) or state,
         properties=xml.properties(element),
@@ -91,9 +95,7 @@ def read_network(element: Any, units: Units, log: Log, state: str = "") -> Netwo
     where = xml.called(element)
     structures: dict[str, Structure] = {}
     inverts: dict[tuple[str, str], float] = {}
-    for item in (s for group in xml.children(element, "Structs") for s in group):
-        if xml.local(item) != "Struct":
-            continue
+    for item in _members(element, "Structs", "Struct"):
         named = f"{where} / {xml.called(item)}"
         try:
             structure = _structure(item, units)
@@ -108,9 +110,7 @@ def read_network(element: Any, units: Units, log: Log, state: str = "") -> Netwo
             except ValueError as error:
                 log.skip(f"{named} / {xml.called(invert)}", str(error))
     pipes = []
-    for item in (p for group in xml.children(element, "Pipes") for p in group):
-        if xml.local(item) != "Pipe":
-            continue
+    for item in _members(element, "Pipes", "Pipe"):
         named = f"{where} / {xml.called(item)}"
         try:
             pipe = _pipe(item, units, structures, inverts)
@@ -132,6 +132,12 @@ def read_network(element: Any, units: Units, log: Log, state: str = "") -> Netwo
         description=xml.clean(element.get("desc")),
         state=xml.clean(element.get("state")) or state,
     )
+
+
+def _members(element: Any, group: str, kind: str) -> list[Any]:
+    """All of a kind, in their group as the schema has it, or without one."""
+    groups = xml.children(element, group)
+    return [m for g in groups for m in xml.children(g, kind)] + xml.children(element, kind)
 
 
 def _structure(element: Any, units: Units) -> Structure:

@@ -13,7 +13,7 @@ from backend.gauge.elements import Arc, Element, Line, Polyline, Spiral, arc
 from backend.gauge.log import ANGLE, Log
 from backend.gauge.spirals import DirectSpiral, IntegratedSpiral, Shape
 from backend.gauge.transitions import DIRECT, INTEGRATED, UNDEFINED
-from backend.gauge.units import Units, heading_of
+from backend.gauge.units import Units
 from backend.spatial.angles import difference
 from backend.spatial.types import Array
 
@@ -89,10 +89,7 @@ class PlanReader:
         if not math.isfinite(stated):
             return
         tolerance = max(ANGLE, 2e-3 / length)  # coordinates are given to millimetres
-        if abs(float(difference(heading_of(stated), found))) > tolerance:
-            bearing = math.degrees(math.pi / 2 - found) % 360.0
-            what = f"{key}, from north clockwise"
-            self._log.conflict(where, what, math.degrees(stated), bearing, "degrees")
+        self._log.direction(where, key, stated, math.pi / 2 - found, tolerance)
 
     def _line(self, element: Any, where: str) -> tuple[Element, Array]:
         start, end = self._ends(element)
@@ -219,8 +216,11 @@ def polyline(xyz: Array, name: str = "") -> tuple[Polyline, Array]:
 
 
 def _heights(distances: Any, heights: Any) -> Array:
+    """(n, 2); none when a height is missing, or when all are zero, as programs write that draw in
+    plan."""
     table = np.stack([np.asarray(distances, dtype=float), np.asarray(heights, dtype=float)], axis=1)
-    return table if np.isfinite(table).all() else np.zeros((0, 2))
+    known = np.isfinite(table).all() and table[:, 1].any()
+    return table if known else np.zeros((0, 2))
 
 
 def _shape(law: str, length: float, k0: float, k1: float) -> Shape:

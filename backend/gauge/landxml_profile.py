@@ -15,6 +15,7 @@ from backend.gauge.profile import Profile, Pvi, build
 from backend.gauge.transitions import DIRECT, INTEGRATED, Law
 from backend.gauge.units import Units
 
+NEAR = 1.0  # where the plan is looked at for the side of a cant [m]
 KINDS = ("PVI", "CircCurve", "ParaCurve", "UnsymParaCurve")
 HIGHEST_CANT = 1.0  # in metres or feet; beyond, the file means millimetres or inches
 RAILS = (*LIFTS, "leftRail", "rightRail")
@@ -140,9 +141,10 @@ def _station(
         raise ValueError("it has no station and applied cant")
     side = {"cw": 1.0, "ccw": -1.0}.get(element.get("curvature", "").strip(), 0.0)
     if side == 0.0 and value != 0.0:
-        near = float(np.clip(s, 0.0, alignment.length))
-        bend = alignment.plan(np.array([near]))[2][0]
-        if not abs(bend) > 0.0:
+        near = np.clip(s + np.array([-NEAR, 0.0, NEAR]), 0.0, alignment.length)
+        bends = np.nan_to_num(alignment.plan(near)[2])
+        bend = bends[np.argmax(np.abs(bends))]
+        if bend == 0.0:
             raise ValueError("it does not say to which side, nor does the plan bend there")
         side = -math.copysign(1.0, bend)
     if element.get("adverse", "").strip() in ("true", "1"):

@@ -2,7 +2,8 @@
 
 A header and one point a row, separated by commas or semicolons:
 
-    name   what the point belongs to; rows of one name make one line, in the file's order
+    name   what the point belongs to; rows of one name make one line, in the file's order, and a
+           name with a single row a point
     east   [m] in the site's projected CRS
     north  [m]
     height [m], may be empty or missing
@@ -61,7 +62,8 @@ def parse(data: bytes, file: str, epsg: int | None = None) -> Model:
         row = members[0][0]
         kind = row.get("kind", "")
         if kind != TRACK:
-            features.append(Feature(name, kind, (xyz,)))
+            lone = len(xyz) == 1
+            features.append(Feature(name, kind, () if lone else (xyz,), xyz if lone else xyz[:0]))
             continue
         try:
             alignments.append(_track(name, members, xyz))

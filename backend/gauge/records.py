@@ -87,16 +87,17 @@ class Surface:
 
 @dataclass(frozen=True)
 class Feature:
-    """A plan feature: a cable, fence, railing, footing or anything else given by lines or a point.
+    """A plan feature: a cable, fence, railing, footing or anything else given by lines or points.
 
     kind: "cable", "footing", "railing", "fence", "surfaceStructure", "planfeature", another word
-    of the file or ""; lines: polylines (k, 3) [m], (1, 3) for a point; properties: the file's own,
-    each as "extension.label".
+    of the file, "points" for a group of surveyed points, or ""; lines: polylines (k, 3) [m];
+    points: (n, 3) single points [m]; properties: the file's own, each as "extension.label".
     """
 
     name: str
     kind: str
-    lines: tuple[Array, ...]
+    lines: tuple[Array, ...] = ()
+    points: Array = field(default_factory=lambda: np.zeros((0, 3)))
     description: str = ""
     state: str = ""
     properties: dict[str, str] = field(default_factory=dict)

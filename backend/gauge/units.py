@@ -52,11 +52,6 @@ class Units:
         return sign * math.radians(degrees + minutes / 60 + seconds / 3600)
 
 
-def heading_of(bearing: float) -> float:
-    """Heading counter-clockwise from east [rad] of a bearing clockwise from north [rad]."""
-    return math.pi / 2 - bearing
-
-
 def units_of(attributes: Mapping[str, str], imperial: bool) -> tuple[Units, list[str]]:
     """The units that a <Metric> or <Imperial> element states, and what of it is not known.
 
