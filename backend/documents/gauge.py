@@ -52,6 +52,7 @@ class PointModel(BaseModel):
     gradient: float | None = Field(description="rise over distance in plan")
     cant: float = Field(description="[m], positive when the left rail is the higher one")
     curvature: float | None = Field(description="[1/m], left positive")
+    lift: float = Field(description="how far cant raises the middle between the rails above z [m]")
 
 
 class EquationModel(BaseModel):
@@ -232,18 +233,19 @@ def _alignment(a: Alignment, step: float) -> AlignmentModel:
 
 
 def _points(a: Alignment, s: Array) -> list[PointModel]:
-    line, height = a.at(s), a.height(s)[0]
+    line = a.at(s)
     station = s + a.stations.start
     return [
         PointModel(
             station=float(station[k]),
             e=_known(line.xyz[k, 0]),
             n=_known(line.xyz[k, 1]),
-            z=_known(height[k]),
+            z=_known(line.xyz[k, 2]),
             heading=_known(line.heading[k]),
             gradient=_known(line.gradient[k]),
             cant=float(line.cant[k]),
             curvature=_known(line.curvature[k]),
+            lift=float(line.lift[k]),
         )
         for k in range(len(s))
     ]

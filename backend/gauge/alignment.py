@@ -19,10 +19,11 @@ _END = 1e-3  # beyond an element by less, its end is meant: files round to milli
 
 @dataclass(frozen=True)
 class Centreline:
-    """An alignment at k places. xyz: (k, 3) the middle between the rails at their height [m];
-    heading: (k,) counter-clockwise from east [rad]; gradient: (k,) rise over distance in plan;
-    cant: (k,) [m], positive when the left rail is the higher one; curvature: (k,) [1/m], left
-    positive.
+    """An alignment at k places. xyz: (k, 3) the middle between the rails at the profile's height,
+    as without cant [m]; heading: (k,) counter-clockwise from east [rad]; gradient: (k,) rise over
+    distance in plan; cant: (k,) [m], positive when the left rail is the higher one; curvature:
+    (k,) [1/m], left positive; lift: (k,) how far cant raises the middle above xyz, by the rail that
+    it turns the track about [m].
 
     NaN where nothing is known: xyz where an element was not read, its height and the gradient
     where there is no profile.
@@ -33,6 +34,7 @@ class Centreline:
     gradient: Array
     cant: Array
     curvature: Array
+    lift: Array
 
 
 @dataclass(frozen=True)
@@ -73,12 +75,12 @@ class Alignment:
         s = np.asarray(s, dtype=float)
         xy, heading, curvature = self.plan(s)
         height, gradient = self.height(s)
-        cant = np.zeros(len(s))
+        cant, lift = np.zeros(len(s)), np.zeros(len(s))
         if self.cant is not None:
             cant = self.cant.at(s)
-            height = height + self.cant.lift(cant)
+            lift = self.cant.lift(cant, curvature)
         xyz = np.concatenate([xy, height[:, None]], axis=1)
-        return Centreline(xyz, heading, gradient, cant, curvature)
+        return Centreline(xyz, heading, gradient, cant, curvature, lift)
 
     def plan(self, s: Array) -> tuple[Array, Array, Array]:
         """Positions (k, 2), headings and curvatures (k,) at s (k,); NaN off the elements."""

@@ -14,8 +14,7 @@ import numpy as np
 from backend.gauge.transitions import Law
 from backend.spatial.types import Array
 
-# By how much of |cant| the middle of the track lies above the line that the profile describes.
-LIFTS = {"insideRail": 0.5, "outsideRail": -0.5, "center": 0.0, "": 0.0}
+ROTATION_POINTS = ("", "center", "insideRail", "outsideRail", "leftRail", "rightRail")
 
 
 @dataclass(frozen=True)
@@ -45,10 +44,14 @@ class Cant:
             value[inside] = self.values[i] + rise * law.bend(u)
         return np.asarray(value)
 
-    def lift(self, cant: Array) -> Array:
-        """(k,) how far the middle between the rails lies above the profile [m]."""
-        if self.rotation_point == "leftRail":
-            return -cant / 2
-        if self.rotation_point == "rightRail":
-            return cant / 2
-        return np.asarray(LIFTS.get(self.rotation_point, 0.0) * np.abs(cant))
+    def lift(self, cant: Array, curvature: Array) -> Array:
+        """(k,) how far cant (k,) [m] raises the middle between the rails above the profile [m].
+
+        The inside rail is that on which side the track bends by curvature (k,); on a straight the
+        lower one, as it is in the curve that a ramp leads to.
+        """
+        if self.rotation_point in ("leftRail", "rightRail"):
+            return cant / 2 if self.rotation_point == "rightRail" else -cant / 2
+        inside = np.where(curvature == 0.0, np.abs(cant), -np.sign(curvature) * cant) / 2
+        sign = {"insideRail": 1.0, "outsideRail": -1.0}.get(self.rotation_point, 0.0)
+        return np.asarray(np.nan_to_num(sign * inside))

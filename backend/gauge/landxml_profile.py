@@ -9,7 +9,7 @@ import numpy as np
 
 from backend.gauge import xml_values as xml
 from backend.gauge.alignment import Alignment
-from backend.gauge.cant import LIFTS, Cant
+from backend.gauge.cant import ROTATION_POINTS, Cant
 from backend.gauge.log import Log
 from backend.gauge.profile import Profile, Pvi, build
 from backend.gauge.transitions import DIRECT, INTEGRATED, Law
@@ -18,7 +18,6 @@ from backend.gauge.units import Units
 NEAR = 1.0  # where the plan is looked at for the side of a cant [m]
 KINDS = ("PVI", "CircCurve", "ParaCurve", "UnsymParaCurve")
 HIGHEST_CANT = 1.0  # in metres or feet; beyond, the file means millimetres or inches
-RAILS = (*LIFTS, "leftRail", "rightRail")
 
 
 def read_profiles(
@@ -123,8 +122,9 @@ def read_cant(
         log.skip(where, f"its gauge is {gauge:g} m; allowed is 0.3 to 4")
         gauge = math.nan
     rail = xml.clean(element.get("rotationPoint"))
-    if rail not in RAILS:
-        log.skip(where, f'its rotationPoint is "{rail}"; read are {", ".join(filter(None, RAILS))}')
+    if rail not in ROTATION_POINTS:
+        read = ", ".join(ROTATION_POINTS[1:])
+        log.skip(where, f'its rotationPoint is "{rail}", taken as center; read are {read}')
         rail = ""
     name = xml.clean(element.get("name"))
     laws = tuple(law for _, _, law in rising)

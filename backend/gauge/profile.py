@@ -15,6 +15,7 @@ import numpy as np
 
 from backend.spatial.types import Array
 
+SHORTEST = 1e-3  # of a vertical curve's length and radius [m]
 REACH = 0.1  # how far beyond its ends a profile is continued by its end's grade [m]
 
 
@@ -158,7 +159,7 @@ def _same_length(stated: float, radius: float, turn: float) -> bool:
 def _fits(
     radius: float, turn: float, before: float, after: float, room: tuple[float, float]
 ) -> bool:
-    if not (math.isfinite(radius) and radius > 0.0):
+    if not SHORTEST <= radius < math.inf:
         return False
     tangent = radius * math.tan(abs(turn) / 2)
     return (
@@ -172,7 +173,7 @@ def _parabola(
 ) -> tuple[list[Piece], float]:
     """Two parabolas that meet below or above the PVI; with equal lengths they are one."""
     l1, l2 = pvi.length_in, pvi.length_out
-    if not (math.isfinite(l1) and math.isfinite(l2) and l1 > 0.0 and l2 > 0.0):
+    if not (SHORTEST <= l1 < math.inf and SHORTEST <= l2 < math.inf):
         raise ValueError("its parabola has no length; the break of grade is left sharp")
     if l1 > room[0] + 1e-3 or l2 > room[1] + 1e-3:
         raise ValueError(

@@ -64,9 +64,13 @@ def test_without_a_side_it_is_that_of_the_plan() -> None:
     [("insideRail", 0.06), ("outsideRail", -0.06), ("center", 0.0), ("leftRail", -0.06)],
 )
 def test_the_middle_rises_about_the_rail_that_stays(rail: str, rise: float) -> None:
-    found = read(rows(*RAMP), f'gauge="1.524" rotationPoint="{rail}"').alignments[0]
-    assert found.at(np.array([250.0])).xyz[0, 2] == pytest.approx(7.0 + rise)
-    assert found.height(np.array([250.0]))[0] == pytest.approx([7.0])
+    attributes = f'gauge="1.524" rotationPoint="{rail}"'
+    line = read(rows(*RAMP), attributes).alignments[0].at(np.array([250.0]))
+    assert line.lift == pytest.approx([rise])
+    assert line.xyz[0, 2] == pytest.approx(7.0)
+    # With adverse cant the inside rail, on the right here, is the higher one.
+    adverse = read(rows(*RAMP, more='curvature="cw" adverse="true"'), attributes)
+    assert adverse.alignments[0].at(np.array([250.0])).lift == pytest.approx([-rise])
 
 
 def test_transition_types_shape_the_ramp() -> None:
