@@ -23,6 +23,7 @@ from cockpit.cli_entry import (
     users,
 )
 from cockpit.cli_formats import convert, export
+from cockpit.cli_gauge import gauge
 from cockpit.cli_keys import LinkConfig, keys
 from cockpit.cli_playback import add_commands
 from cockpit.cli_recordings import recordings
@@ -315,6 +316,7 @@ app.add_typer(users, name="users")
 app.command()(keys)
 app.command()(convert)
 app.command()(export)
+app.command()(gauge)
 
 
 def _interrupted() -> threading.Event:

@@ -24,6 +24,9 @@ ROOMS: dict[str, set[str]] = {
         "backend.fusion",
     },
     "backend.safety": {"backend.collision", "backend.machine", "backend.spatial"},
+    "backend.gauge": {
+        *("backend.collision", "backend.machine", "backend.spatial", "backend.errors"),
+    },
     "backend.control": {
         *("backend.safety", "backend.machine", "backend.spatial", "backend.errors"),
     },
@@ -34,7 +37,7 @@ ROOMS: dict[str, set[str]] = {
     "backend.documents": {
         *("backend.pipeline", "backend.safety", "backend.cspace", "backend.collision"),
         *("backend.site", "backend.fusion", "backend.machine", "backend.spatial"),
-        "backend.errors",
+        *("backend.gauge", "backend.errors"),
     },
     "backend.shell": {"backend"},
     "backend.warm": {
@@ -53,6 +56,8 @@ LIBRARIES: dict[str, str | tuple[str, ...]] = {
     "zstandard": "backend.shell.session",
     "can": ("backend.shell.session", "backend.shell.agent"),
     "cantools": ("backend.shell.session", "backend.shell.agent"),
+    "lxml": "backend.gauge",
+    "ifcopenshell": "backend.gauge",
     "pyarrow": "backend.shell.session",
     "fastapi": "backend.shell.app",
     "fastapi_offline": "backend.shell.app",
@@ -62,7 +67,7 @@ LIBRARIES: dict[str, str | tuple[str, ...]] = {
 }
 
 IMPURE = {"time", "random", "threading", "logging", "asyncio", "socket", "subprocess", "requests"}
-PURE = {"spatial", "collision", "control", "cspace", "fusion", "safety", "pipeline"}
+PURE = {"spatial", "collision", "control", "cspace", "fusion", "gauge", "safety", "pipeline"}
 
 
 def module_name(path: Path) -> str:
@@ -130,7 +135,8 @@ def test_every_import_is_a_declared_dependency(repository: Path) -> None:
         "python-fcl": "fcl",
         "pyyaml": "yaml",
     }
-    declared = {aliases.get(name, name).replace("-", "_") for name in project["dependencies"]}
+    names = [*project["dependencies"], *project["optional-dependencies"]["ifc"]]
+    declared = {aliases.get(name, name).replace("-", "_") for name in names}
     for path in sources():
         for name in imports_of(path):
             top = name.split(".")[0]
