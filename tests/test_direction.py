@@ -16,7 +16,13 @@ ROOMS: dict[str, set[str]] = {
     "backend.machine": {"backend.spatial", "backend.errors"},
     "backend.collision": {"backend.machine", "backend.spatial"},
     "backend.fusion": {"backend.machine", "backend.spatial", "backend.errors"},
-    "backend.site": {"backend.fusion", "backend.machine", "backend.spatial", "backend.errors"},
+    "backend.gauge": {
+        *("backend.collision", "backend.machine", "backend.spatial", "backend.errors"),
+    },
+    "backend.site": {
+        *("backend.gauge", "backend.fusion", "backend.machine", "backend.spatial"),
+        "backend.errors",
+    },
     "backend.cspace": {
         "backend.collision",
         "backend.machine",
@@ -33,8 +39,8 @@ ROOMS: dict[str, set[str]] = {
     },
     "backend.documents": {
         *("backend.pipeline", "backend.safety", "backend.cspace", "backend.collision"),
-        *("backend.site", "backend.fusion", "backend.machine", "backend.spatial"),
-        "backend.errors",
+        *("backend.gauge", "backend.site", "backend.fusion", "backend.machine"),
+        *("backend.spatial", "backend.errors"),
     },
     "backend.shell": {"backend"},
     "backend.warm": {
@@ -62,7 +68,7 @@ LIBRARIES: dict[str, str | tuple[str, ...]] = {
 }
 
 IMPURE = {"time", "random", "threading", "logging", "asyncio", "socket", "subprocess", "requests"}
-PURE = {"spatial", "collision", "control", "cspace", "fusion", "safety", "pipeline"}
+PURE = {"spatial", "collision", "control", "cspace", "fusion", "gauge", "safety", "pipeline"}
 
 
 def module_name(path: Path) -> str:

@@ -1,0 +1,1 @@
+"""The virtual working gauge: infrastructure features to limit volumes (Mäkinen 2021)."""
