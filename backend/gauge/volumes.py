@@ -17,6 +17,8 @@ from backend.spatial.types import Array, BoolArray, frozen
 Kind: TypeAlias = Literal[
     "track", "overhead", "pole", "building", "road", "ceiling", "buried", "keep_out", "keep_in"
 ]
+GRID = 1e-5
+"""[m] of the corners of plans."""
 KINDS: tuple[str, ...] = get_args(Kind)
 
 
@@ -97,7 +99,9 @@ class LimitVolume:
         """The volume seen from above, as polygons."""
         corners = [h.vertices for h in self.hulls] or list(self.boxes.corners())
         seen = [MultiPoint(c[:, :2]).convex_hull for c in corners]
-        parts = shapely.get_parts(shapely.union_all([s for s in seen if isinstance(s, Polygon)]))
+        polygons = [s for s in seen if isinstance(s, Polygon)]
+        # On a grid, so that neighbours leave no slivers between them.
+        parts = shapely.get_parts(shapely.union_all(polygons, grid_size=GRID))
         return tuple(p for p in parts if isinstance(p, Polygon))
 
 
