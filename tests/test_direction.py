@@ -16,7 +16,13 @@ ROOMS: dict[str, set[str]] = {
     "backend.machine": {"backend.spatial", "backend.errors"},
     "backend.collision": {"backend.machine", "backend.spatial"},
     "backend.fusion": {"backend.machine", "backend.spatial", "backend.errors"},
-    "backend.site": {"backend.fusion", "backend.machine", "backend.spatial", "backend.errors"},
+    "backend.gauge": {
+        *("backend.collision", "backend.machine", "backend.spatial", "backend.errors"),
+    },
+    "backend.site": {
+        *("backend.gauge", "backend.fusion", "backend.machine", "backend.spatial"),
+        "backend.errors",
+    },
     "backend.cspace": {
         "backend.collision",
         "backend.machine",
@@ -36,8 +42,8 @@ ROOMS: dict[str, set[str]] = {
     },
     "backend.documents": {
         *("backend.pipeline", "backend.safety", "backend.cspace", "backend.collision"),
-        *("backend.site", "backend.fusion", "backend.machine", "backend.spatial"),
-        *("backend.gauge", "backend.errors"),
+        *("backend.gauge", "backend.site", "backend.fusion", "backend.machine"),
+        *("backend.spatial", "backend.errors"),
     },
     "backend.shell": {"backend"},
     "backend.warm": {

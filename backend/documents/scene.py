@@ -80,7 +80,10 @@ def make_scene(
         np.array([o.half_extents for o in state.obstacles]).reshape(n, 3),
     )
     bodies = SiteBodies(
-        concatenated([site.boxes, obstacles]), (*site.names, *(o.name for o in state.obstacles))
+        concatenated([site.boxes, obstacles]),
+        (*site.names, *(o.name for o in state.obstacles)),
+        site.volumes,
+        site.idle,
     )
     return Scene(machines, poses, placed, origin, bodies)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from backend.documents.limit_volumes import volumes_document
 from backend.machine.model import Machine
 from backend.pipeline.config import Config
 from backend.site.site import Site
@@ -12,7 +13,8 @@ from backend.site.site import Site
 
 def site_document(site: Site, config: Config) -> dict[str, Any]:
     """What does not change during a run. Site frame in metres, radians."""
-    boxes = config.site.boxes
+    standing = config.site.standing
+    boxes = standing.boxes
     return {
         "name": site.name,
         "title": site.title,
@@ -36,8 +38,9 @@ def site_document(site: Site, config: Config) -> dict[str, Any]:
                 "rotation": boxes.rotations[k].tolist(),
                 "half_extents": boxes.half_extents[k].tolist(),
             }
-            for k, name in enumerate(config.site.names)
+            for k, name in enumerate(standing.names)
         ],
+        "gauge": volumes_document(config.site),
     }
 
 

@@ -1,16 +1,21 @@
-"""What stands on a site, as named boxes."""
+"""What stands on a site, and what its working gauge keeps machines from, as named boxes."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 
 from backend.errors import InputError
+from backend.gauge.choose import why_idle
+from backend.gauge.features import Feature
+from backend.gauge.volumes import LimitVolume
 from backend.machine.bodies import Progress, fitted
 from backend.machine.meshes import mesh_triangles
+from backend.site.gauge import site_options, site_volumes
 from backend.site.site import Site
 from backend.site.tables import ObstacleMesh
 from backend.spatial.boxes import NO_BOXES, Boxes, concatenated
@@ -21,10 +26,16 @@ from backend.spatial.types import Array
 
 @dataclass(frozen=True)
 class SiteBodies:
-    """Boxes that do not move, in the site frame, and their names ("wall", "hall/0", "hall/1")."""
+    """Boxes that do not move, in the site frame, and their names ("wall", "hall/0", "hall/1").
+
+    After the obstacles come the boxes of the working gauge ("gauge:T1/0"), of all volumes but the
+    idle ones. volumes: of the working gauge; idle: by name of a volume, why it holds for nobody.
+    """
 
     boxes: Boxes = NO_BOXES
     names: tuple[str, ...] = ()
+    volumes: tuple[LimitVolume, ...] = ()
+    idle: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if len(self.names) != len(self.boxes):
@@ -37,17 +48,27 @@ class SiteBodies:
 
     @cached_property
     def full_names(self) -> tuple[str, ...]:
-        """ "site:wall", "site:hall/0"."""
-        return tuple(f"site:{name}" for name in self.names)
+        """ "site:wall", "site:hall/0", "gauge:T1/0"."""
+        return tuple(name if _of_gauge(name) else f"site:{name}" for name in self.names)
+
+    @cached_property
+    def standing(self) -> SiteBodies:
+        """Without the working gauge: what can be seen and touched."""
+        kept = np.array([not _of_gauge(name) for name in self.names], dtype=bool)
+        names = tuple(name for name in self.names if not _of_gauge(name))
+        return SiteBodies(self.boxes.take(kept), names)
 
 
 NO_SITE_BODIES = SiteBodies()
 
 
-def site_bodies(site: Site, progress: Progress | None = None) -> SiteBodies:
-    """Obstacles as they are, meshes in the boxes that are fitted to them (once, then remembered).
+def site_bodies(
+    site: Site, progress: Progress | None = None, features: Iterable[Feature] = ()
+) -> SiteBodies:
+    """Obstacles as they are, meshes in the boxes that are fitted to them (once, then remembered),
+    and the limit volumes of the site's tables and of other `features` in the site frame.
 
-    Raises InputError for a mesh that cannot be read.
+    Raises InputError for a mesh that cannot be read, or a feature that makes no volume.
     """
     boxes = [site.obstacle_boxes()]
     names = [obstacle.name for obstacle in site.obstacles]
@@ -55,7 +76,18 @@ def site_bodies(site: Site, progress: Progress | None = None) -> SiteBodies:
         parts = _boxes_of(mesh, site, progress)
         boxes.append(parts)
         names += [f"{mesh.name}/{k}" for k in range(len(parts))]
-    return SiteBodies(concatenated(boxes), tuple(names))
+    volumes = site_volumes(site, features)
+    options = site_options(site)
+    idle = {v.name: why for v in volumes if (why := why_idle(v, options))}
+    for volume in volumes:
+        if volume.name not in idle:
+            boxes.append(volume.boxes)
+            names += volume.box_names
+    return SiteBodies(concatenated(boxes), tuple(names), volumes, idle)
+
+
+def _of_gauge(name: str) -> bool:
+    return name.startswith("gauge:")
 
 
 def _boxes_of(mesh: ObstacleMesh, site: Site, progress: Progress | None) -> Boxes:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,7 @@ from pydantic import ValidationError
 
 from backend.errors import InputError
 from backend.fusion.crs import SiteFrame
+from backend.site.gauge_tables import Gauge
 from backend.site.messages import sentence
 from backend.site.tables import (
     Hardware,
@@ -49,6 +50,7 @@ class Site:
     link: Link
     recording: Recording
     can_map: Path | None = None
+    gauge: Gauge = field(default_factory=Gauge)
 
     @property
     def folder(self) -> Path:
@@ -125,6 +127,7 @@ def parse_site(data: dict[str, Any], path: Path) -> Site:
         link=table.link,
         recording=table.recording,
         can_map=path.resolve().parent / can_map if can_map else None,
+        gauge=table.gauge,
     )
 
 

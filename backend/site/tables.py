@@ -22,6 +22,7 @@ from backend.site.base import (
     Tilt,
     Vector,
 )
+from backend.site.gauge_tables import Gauge
 from backend.site.others import Can, MachineTopics, refuse_shared_topics
 from backend.spatial.rotation import rz
 from backend.spatial.types import Array, frozen
@@ -222,6 +223,7 @@ class SiteTable(Table):
     link: Link = Link()
     recording: Recording = Recording()
     can: Can = Can()
+    gauge: Gauge = Gauge()
 
     @model_validator(mode="after")
     def _distinct(self) -> SiteTable:

@@ -71,7 +71,7 @@ def scene_site(site: Site, models: Mapping[str, Machine]) -> SceneSite:
         title=site.title,
         origin=(easting, northing, height),
         machines={m.name: SceneMachine(m.label, models[m.name]) for m in site.machines},
-        obstacles=site_bodies(site).boxes,
+        obstacles=site_bodies(site).standing.boxes,
         slow_below=site.safety.slow_below,
         stop_below=site.safety.stop_below,
     )

@@ -99,11 +99,12 @@ export function stopsInBlocked(byteAt, from, by, steps = 24) {
   return !bad(0) && Array.from({ length: steps - 1 }, (_, k) => k + 1).some(bad);
 }
 
-/** "right:stick/0" -> "RIGHT stick", "site:wall" -> "wall", "left:tracks/0" -> "own tracks", null -> "limit". */
+/** "right:stick/0" -> "RIGHT stick", "site:wall" -> "wall", "gauge:T1/12" -> "gauge T1", "left:tracks/0" -> "own tracks", null -> "limit". */
 export function obstacle(own, hits) {
   if (!hits) return "limit";
   const [who, what] = String(hits).includes(":") ? String(hits).split(/:(.*)/) : [own, hits];
   if (who === "site") return what;
+  if (who === "gauge") return `gauge ${what.split("/")[0]}`;
   return who === own ? `own ${partName(what)}` : `${machine(who) ? nameOf(who) : who.toUpperCase()} ${partName(what)}`;
 }
 
