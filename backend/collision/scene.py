@@ -12,7 +12,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from backend.collision.search_kernels import BOXES, POINTS, TRIANGLES
+from backend.collision.kinds import BOXES, POINTS, TRIANGLES
 from backend.collision.tree import Tree, curve_order, tree, tree_of_points
 from backend.errors import InputError
 from backend.spatial.boxes import NO_BOXES, Boxes

@@ -16,8 +16,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from backend.collision.box_distance import lower_bounds, pair_distances
+from backend.collision.corner_kernels import corner_rows, patches
+from backend.collision.kinds import BOXES
 from backend.collision.scene import Scene
-from backend.collision.search_kernels import BOXES, corner_rows, patches, search
+from backend.collision.search_kernels import search
 from backend.spatial.boxes import Boxes
 from backend.spatial.types import Array, BoolArray, IntArray
 
