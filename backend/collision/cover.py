@@ -28,15 +28,15 @@ def cover(
         return NO_BOXES, ()
     one = scene.sets[0]
     held = around.centers.copy(), around.rotations.copy(), around.half_extents.copy()
-    index, is_node = cover_kernels.cover(one.tree.arrays, held, float(reach), float(near), grain)
-    item, node = index[~is_node], index[is_node]
+    index, begin, many = cover_kernels.cover(
+        one.tree.arrays, held, float(reach), float(near), grain
+    )
+    item, node = index[many == 0], index[many > 0]
     low, high = one.tree.lows[node], one.tree.highs[node]
     apart = Boxes(one.centers[item], one.rotations[item], one.half_extents[item])
     turns = np.tile(np.eye(3), (len(node), 1, 1))
     together = Boxes(0.5 * (low + high), turns, 0.5 * (high - low))
-    names = [scene.names[k] for k in item]
-    leaves, n = len(one.tree.lows) // 2, len(one.tree.order)
-    for k in node:
-        first, last = cover_kernels.items_of(int(k), leaves, one.tree.per_leaf, n)
-        names.append(f"{scene.names[one.tree.order[first]]} + {last - first - 1} more")
+    names = [scene.names[k] for k in item.tolist()]
+    for first, count in zip(begin[many > 0].tolist(), many[many > 0].tolist(), strict=True):
+        names.append(f"{scene.names[first]} + {count - 1} more")
     return concatenated([apart, together]), tuple(names)

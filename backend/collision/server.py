@@ -79,6 +79,9 @@ def closest(scene: Scene, links: Boxes, reach: float, k: int = MOST, band: float
     for one in scene.sets:
         wide = float(band) if one.patched else -1.0
         search(one.kind, one.tree.arrays, one.arrays, held, float(reach), wide, found)
+    inside = _inside_hulls(scene, links)
+    if not counts.any():
+        return _closest(*inside)
     link, slot = np.nonzero(np.arange(k) < counts[:, None])
     body = keys[link, slot] // 8
     signed, points = distances[link, slot], found[4][link, slot]
@@ -87,7 +90,6 @@ def closest(scene: Scene, links: Boxes, reach: float, k: int = MOST, band: float
     parts = [_box_corners(scene, held, rows, items[link, slot], is_box, band)]
     parts += [_surface_corners(scene, links, rows, ~is_box, band)]
     kept = ~_stood_for(rows, parts)
-    inside = _inside_hulls(scene, links)
     joined = [tuple(v[kept] for v in rows), *parts, inside]
     return _closest(*(np.concatenate(column) for column in zip(*joined, strict=True)))
 
@@ -200,6 +202,8 @@ def _stood_for(rows: _Rows, corners: list[_Rows]) -> BoolArray:
 def _inside_hulls(scene: Scene, links: Boxes) -> _Rows:
     """Links whose middle is inside of a convex hull: they overlap even far from all its faces."""
     parts = [_none()]
+    if not scene.hulls:
+        return parts[0]
     for planes, body in scene.hulls:
         heights = links.centers @ planes[:, :3].T - planes[:, 3]
         link = np.flatnonzero(heights.max(axis=1, initial=-np.inf) <= 0.0)

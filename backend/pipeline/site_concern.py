@@ -19,6 +19,7 @@ from backend.pipeline.config import Config
 from backend.pipeline.records import MachineState
 from backend.safety import site
 from backend.safety.approach import Approach, approach_standing, standing_reach
+from backend.safety.hulls import hulls
 from backend.safety.record import Concern
 from backend.site.bodies import SiteBodies
 from backend.spatial.boxes import Boxes
@@ -109,7 +110,7 @@ def _approach(
     assert state.body is not None
     keep = config.limits.stop_below + spread(machine, state.pose)
     reach = standing_reach(machine, keep, LONGEST_DELAY)
-    boxes, names = cover(bodies, state.body.boxes, reach, NEAR)
+    boxes, names = cover(bodies, hulls(machine).around(state.body.link_poses), reach, NEAR)
     if not len(boxes):
         return None
     return approach_standing(

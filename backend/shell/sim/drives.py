@@ -163,7 +163,10 @@ def drive(
             outcome.driven.append((fleet[0].driven, fleet[1].driven))
         if t >= safe_until:
             first, second = (bodies_of(m.machine, m.state) for m in fleet)
-            found = [contact(first, second), *(contact(one, bodies.boxes) for one in (first, second))]
+            found = [
+                contact(first, second),
+                *(contact(one, bodies.boxes) for one in (first, second)),
+            ]
             touches, apart = any(hit for hit, _ in found), min(gap for _, gap in found)
             outcome.nearest = min(outcome.nearest, apart)
             if touches:
