@@ -9,6 +9,8 @@ import numpy as np
 from rich.progress import track
 
 from backend.collision.closest import closest_pairs
+from backend.collision.scene import Surface, scene
+from backend.collision.server import closest, pairs
 from backend.cspace.driving import driving_zone, turning_zone
 from backend.cspace.joint_bars import joint_bar
 from backend.cspace.joint_image import certified4, joint4
@@ -34,6 +36,10 @@ def compile_kernels() -> None:
     body = place(machine, q, transform.make(np.eye(3), np.array([4.0, 0.0, 0.0])))
     near: Boxes = body.boxes
     closest_pairs(near, near)
+    triangle = Surface("triangle", np.eye(3), np.array([[0, 1, 2]]))
+    site = scene(near, machine.body_names, meshes=(triangle,)).with_cloud("cloud", np.eye(3), 0.1)
+    closest(site, near, 9.0)
+    pairs(near, machine.self_pair_index, 9.0)
     outlines_of(machine, near)
     margins(machine, q, near, 0.1, np.full(len(q), 0.01))
     motion = Motion(body.link_poses, body.link_poses[0], q, np.zeros(3), 0.0)

@@ -14,7 +14,7 @@ ROOMS: dict[str, set[str]] = {
     "backend.errors": set(),
     "backend.spatial": {"backend.errors"},
     "backend.machine": {"backend.spatial", "backend.errors"},
-    "backend.collision": {"backend.machine", "backend.spatial"},
+    "backend.collision": {"backend.machine", "backend.spatial", "backend.errors"},
     "backend.fusion": {"backend.machine", "backend.spatial", "backend.errors"},
     "backend.gauge": {
         *("backend.collision", "backend.machine", "backend.spatial", "backend.errors"),

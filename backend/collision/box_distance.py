@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from backend.collision import box_kernels
+from backend.collision import box_kernels, plane_kernels
 from backend.spatial.boxes import Boxes
 from backend.spatial.types import Array, IntArray
 
@@ -46,6 +46,16 @@ def separations(a: Boxes, b: Boxes) -> Array:
 def lower_bounds(a: Boxes, b: Boxes) -> Array:
     """(n, m) lower bounds of the distances of all pairs, 0 where they may touch [m]."""
     return np.asarray(box_kernels.lower_bounds(*_arrays(a), *_arrays(b)))
+
+
+def away(a: Boxes, b: Boxes, i: int, j: int) -> Array:
+    """(3,) unit vector from b[j] to a[i] along the separating axis of the largest gap: on overlap
+    the shortest way out.
+    """
+    normal = np.empty(3)
+    one, two = (tuple(v[k].copy() for v in _arrays(boxes)) for boxes, k in ((a, i), (b, j)))
+    plane_kernels.separating_plane(*one, *two, 0.0, normal)
+    return normal
 
 
 def _arrays(boxes: Boxes) -> tuple[Array, Array, Array]:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from backend.collision.fast_box_kernels import boxes_apart
 from backend.spatial.types import Array, IntArray
 
-_PARALLEL = 1e-12  # squared sine below which two edges count as parallel
 _NO_AXIS = 1e-9  # length below which a crossed axis gives no direction
 
 
@@ -92,7 +92,7 @@ def separations(ca: Array, Ra: Array, ha: Array, cb: Array, Rb: Array, hb: Array
 
 
 @njit(cache=True, nogil=True)
-def _nearest_in_box(p: Array, c: Array, R: Array, h: Array, out: Array) -> float:
+def nearest_in_box(p: Array, c: Array, R: Array, h: Array, out: Array) -> float:
     """Writes the point of a box nearest to p; returns the squared distance [m^2]."""
     local = np.empty(3)
     for k in range(3):
@@ -108,18 +108,6 @@ def _nearest_in_box(p: Array, c: Array, R: Array, h: Array, out: Array) -> float
 
 
 @njit(cache=True, nogil=True)
-def _corners(c: Array, R: Array, h: Array) -> Array:
-    """(8, 3); bit k of the index is the sign along axis k."""
-    points = np.empty((8, 3))
-    for i in range(8):
-        for x in range(3):
-            points[i, x] = c[x]
-            for k in range(3):
-                points[i, x] += R[x, k] * (h[k] if i >> k & 1 else -h[k])
-    return points
-
-
-@njit(cache=True, nogil=True)
 def pair_distance(
     ca: Array, Ra: Array, ha: Array, cb: Array, Rb: Array, hb: Array, points: Array
 ) -> float:
@@ -128,65 +116,12 @@ def pair_distance(
     if gap <= 0.0:
         middle = 0.5 * (ca + cb)
         in_a, in_b = np.empty(3), np.empty(3)
-        _nearest_in_box(middle, ca, Ra, ha, in_a)
-        _nearest_in_box(middle, cb, Rb, hb, in_b)
+        nearest_in_box(middle, ca, Ra, ha, in_a)
+        nearest_in_box(middle, cb, Rb, hb, in_b)
         for x in range(3):
             points[0, x] = points[1, x] = 0.5 * (in_a[x] + in_b[x])
         return gap
-    best = np.inf
-    near = np.empty(3)
-    corners_a, corners_b = _corners(ca, Ra, ha), _corners(cb, Rb, hb)
-    for i in range(8):
-        square = _nearest_in_box(corners_a[i], cb, Rb, hb, near)
-        if square < best:
-            best = square
-            points[0], points[1] = corners_a[i], near
-        square = _nearest_in_box(corners_b[i], ca, Ra, ha, near)
-        if square < best:
-            best = square
-            points[0], points[1] = near, corners_b[i]
-    for i in range(8):
-        for ki in range(3):
-            if i >> ki & 1:
-                continue
-            p, u = corners_a[i], corners_a[i | 1 << ki] - corners_a[i]
-            for j in range(8):
-                for kj in range(3):
-                    if j >> kj & 1:
-                        continue
-                    q, v = corners_b[j], corners_b[j | 1 << kj] - corners_b[j]
-                    s, t = _nearest_on_segments(p, u, q, v)
-                    square = 0.0
-                    for x in range(3):
-                        square += (p[x] + s * u[x] - q[x] - t * v[x]) ** 2
-                    if square < best:
-                        best = square
-                        for x in range(3):
-                            points[0, x] = p[x] + s * u[x]
-                            points[1, x] = q[x] + t * v[x]
-    return np.sqrt(best)
-
-
-@njit(cache=True, nogil=True)
-def _nearest_on_segments(p: Array, u: Array, q: Array, v: Array) -> tuple[float, float]:
-    """Parameters in [0, 1] of the closest points of the segments p + s u and q + t v."""
-    uu = vv = uv = uw = vw = 0.0
-    for x in range(3):
-        w = p[x] - q[x]
-        uu += u[x] * u[x]
-        vv += v[x] * v[x]
-        uv += u[x] * v[x]
-        uw += u[x] * w
-        vw += v[x] * w
-    uu, vv = max(uu, 1e-300), max(vv, 1e-300)
-    det = uu * vv - uv * uv
-    s = 0.0
-    if det > _PARALLEL * uu * vv:
-        s = min(max((uv * vw - vv * uw) / det, 0.0), 1.0)
-    t = min(max((uv * s + vw) / vv, 0.0), 1.0)
-    # t may have been clamped: the best s for it.
-    s = min(max((uv * t - uw) / uu, 0.0), 1.0)
-    return s, t
+    return boxes_apart(ca, Ra, ha, cb, Rb, hb, np.empty((11, 3)), points)
 
 
 @njit(cache=True, nogil=True)

@@ -23,8 +23,7 @@ def approach_of(
     """None when no partner can be reached before everything stands."""
     state, machine = machines[own], config.machines[own]
     assert state.body is not None
-    ages = [state.pose.streams[key].age for key in ("joints", "position", "heading")]
-    age = max(now - state.pose.time, min(ages[0], 1.0), 0.0)
+    age = age_of(state, now)
     parts = []
     for name, other in machines.items():
         partner = config.machines[name]
@@ -48,6 +47,11 @@ def approach_of(
             )
         )
     return joined(parts) if parts else None
+
+
+def age_of(state: MachineState, now: float) -> float:
+    """Age of what is known of a machine, by which its braking counts [s]."""
+    return max(now - state.pose.time, min(state.pose.streams["joints"].age, 1.0), 0.0)
 
 
 def unknown_ages(

@@ -23,6 +23,7 @@ from backend.pipeline.margins import machine_margins
 from backend.pipeline.place import base_transform, place
 from backend.pipeline.proximity import measure
 from backend.pipeline.records import Body3D, Health, Inputs, MachineState, Notice, Snapshot
+from backend.pipeline.site_concern import site_concern
 from backend.safety import alarms, partner
 from backend.safety.alarms import Alarm
 from backend.safety.partner import Proximity
@@ -68,6 +69,10 @@ def step(state: State, inputs: Inputs, now: float, config: Config) -> tuple[Stat
     concerns = tuple(
         _partner(name, machines, close, unknown, now, config, name in driven) for name in config.own
     )
+    if len(config.site.boxes):
+        concerns += tuple(
+            site_concern(name, machines[name], now, config, name in driven) for name in config.own
+        )
     concerns += tuple(unknown_ages(driven, machines, now, config))
     raised = alarms.update(state.alarms, concerns, now)
     health = _health(state.health, inputs, strangers)

@@ -22,8 +22,11 @@ import numpy as np
 from backend.machine.model import Machine
 from backend.safety.braking import accelerations, full_speeds, stopping_distance
 from backend.safety.hulls import hulls
+from backend.spatial.boxes import Boxes
 from backend.spatial.types import Array, BoolArray, IntArray
 
+SHARE = 0.5
+"""Part of the room between two machines that one of them may use."""
 AHEAD = 0.4
 """Horizon at which a partner's corners are looked ahead [s]."""
 
@@ -54,7 +57,8 @@ class Approach:
     index: (r, 2) into `own` and `others`, names of bodies "boom/0" and "right:boom/0", and of whole
     parts; room: (r,) distance left before p_l, less what both poses may be wrong by [m]; slope:
     (r, m); bend: (r, m, m); closing: (r,) speed at which the other machine comes nearer [m/s];
-    rates: (m,) the own motions now [rad/s, m/s]; age: of the own data [s].
+    rates: (m,) the own motions now [rad/s, m/s]; age: of the own data [s]; share: part of the room
+    that this machine may use: all of it beside what stands still.
     """
 
     index: IntArray
@@ -66,6 +70,7 @@ class Approach:
     closing: Array
     rates: Array
     age: float
+    share: float = SHARE
 
 
 def approach(
@@ -83,18 +88,66 @@ def approach(
     keep: p_l and what both poses may be wrong by [m]; age: of the own data [s]; delay: the longest
     total delay that commands can have [s].
     """
+    its = hulls(other_machine)
+    boxes = its.placed(other.T_site_links)
+    twists = _twists(other_machine, other, its.moves, boxes[0])
+    others = tuple(f"{other_name}:{name}" for name in its.names)
+    return _rows(machine, own, boxes, twists, its.group, others, keep, age, delay, SHARE)
+
+
+def approach_standing(
+    machine: Machine,
+    own: Motion,
+    boxes: Boxes,
+    names: tuple[str, ...],
+    keep: float,
+    age: float,
+    delay: float,
+) -> Approach:
+    """The same towards boxes (k) that do not move. keep: p_l and what the own pose may be wrong by
+    [m]. The machine may use all of the room: nothing else comes nearer meanwhile.
+    """
+    k = len(boxes)
+    twice = np.concatenate([np.arange(k)] * 2)  # each is its own hull, too
+    still = np.zeros((2 * k, 3)), np.zeros((2 * k, 3))
+    held = boxes.centers[twice], boxes.rotations[twice], boxes.half_extents[twice]
+    return _rows(machine, own, held, still, k + twice, names * 2, keep, age, delay, 1.0)
+
+
+def standing_reach(machine: Machine, keep: float, delay: float) -> float:
+    """No body of the machine comes closer to `keep` of what is farther away than this [m], before
+    it stands from full speed.
+    """
+    stop = stopping_distance(full_speeds(machine), delay, accelerations(machine))
+    far = machine.bounding_radius + float(np.linalg.norm(machine.arm.T_root_swing[:3, 3]))
+    turning = (stop[-2] + stop[-1]) / machine.tracks.gauge * far
+    levers = machine.stretched_levers.max(axis=0, initial=0.0)
+    return float(levers @ stop[:-2] + stop[-1] + turning + keep)
+
+
+def _rows(
+    machine: Machine,
+    own: Motion,
+    others: tuple[Array, Array, Array],
+    twists: tuple[Array, Array],
+    group: IntArray,
+    names: tuple[str, ...],
+    keep: float,
+    age: float,
+    delay: float,
+    share: float,
+) -> Approach:
     from backend.safety.approach_kernels import rows  # compiled code, which playback can do without
 
     full, a = full_speeds(machine), accelerations(machine)
     axes, origins = _axes(machine, own.T_site_links)
-    mine, its = hulls(machine), hulls(other_machine)
-    boxes, other_boxes = mine.placed(own.T_site_links), its.placed(other.T_site_links)
+    mine = hulls(machine)
     T = own.T_site_root
     index, room, slope, bend, closing = rows(
-        boxes,
-        other_boxes,
-        _twists(other_machine, other, its.moves, other_boxes[0]),
-        (mine.group, its.group),
+        mine.placed(own.T_site_links),
+        others,
+        twists,
+        (mine.group, group),
         mine.moves,
         axes,
         origins,
@@ -103,10 +156,10 @@ def approach(
         keep,
         np.array([AHEAD, 2.0 * AHEAD]),
         float((delay + full / a).max()),
+        share,
     )
     rates = np.append(own.rates, own.tracks(machine))
-    others = tuple(f"{other_name}:{name}" for name in its.names)
-    return Approach(index, mine.names, others, room, slope, bend, closing, rates, age)
+    return Approach(index, mine.names, names, room, slope, bend, closing, rates, age, share)
 
 
 def _axes(machine: Machine, T_site_links: Array) -> tuple[Array, Array]:
@@ -141,7 +194,7 @@ def _cross(a: Array, b: Array) -> Array:
 
 
 def joined(parts: list[Approach]) -> Approach:
-    """The rows of several partners as one; at least one part."""
+    """The rows of several partners as one; at least one part, all of the same share."""
     if len(parts) == 1:
         return parts[0]
     offsets = np.cumsum([0, *(len(p.others) for p in parts[:-1])])
@@ -155,4 +208,5 @@ def joined(parts: list[Approach]) -> Approach:
         np.concatenate([p.closing for p in parts]),
         parts[0].rates,
         parts[0].age,
+        parts[0].share,
     )

@@ -71,6 +71,7 @@ def rows(
     keep: float,
     horizons: Array,
     longest: float,
+    share: float,
 ) -> tuple[IntArray, Array, Array, Array, Array]:
     """(index (r, 2), room (r,), slope (r, m), bend (r, m, m), closing (r,)); see `Approach`.
 
@@ -80,7 +81,7 @@ def rows(
     Hulls that are near each other are looked into, body by body.
     moves: (boxes, n); axes, origins: (n, 3) of the joints; base: ahead (3,), up (3,), origin (3,),
     gauge [m]; reach: (m,) how far each motion goes before it stands, from full speed; keep: the gap
-    that must stay [m]; longest: stopping time [s].
+    that must stay [m]; longest: stopping time [s]; share: part of the room that may be used.
     """
     ca, Ra, ha = own
     cb, Rb, hb = other
@@ -119,7 +120,7 @@ def rows(
                 # On overlap the plane cuts both boxes: the gap is that of the pair.
                 left = n0 * x[which, 0] + n1 * x[which, 1] + n2 * x[which, 2] - top
                 left = (left if gap > 0.0 else gap) - keep
-                if most[which] <= 0.5 * left and most[which] <= left - speed * longest:
+                if most[which] <= share * left and most[which] <= left - speed * longest:
                     continue
                 used = 0.0
                 for k in range(m):
@@ -131,7 +132,7 @@ def rows(
                         b += n2 * K[which, k, after, 2]
                         bend[count, k, after] = bend[count, after, k] = b
                         used += (0.5 if after == k else 1.0) * abs(b) * reach[k] * reach[after]
-                if used <= 0.5 * left and used <= left - speed * longest:
+                if used <= share * left and used <= left - speed * longest:
                     continue
                 index[count, 0], index[count, 1] = i, j
                 room[count], closing[count] = left, speed

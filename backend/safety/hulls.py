@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from backend.machine.model import Machine
+from backend.spatial.boxes import Boxes
 from backend.spatial.types import Array, BoolArray, IntArray
 
 
@@ -32,6 +33,10 @@ class Hulls:
         R = T[:, :3, :3]
         centers = (R @ self.centers[:, :, None])[:, :, 0] + T[:, :3, 3]
         return centers, R @ self.rotations, self.half_extents
+
+    def around(self, T_site_links: Array) -> Boxes:
+        """The hulls alone, in the site frame."""
+        return Boxes(*self.placed(T_site_links)).take(self.group == np.arange(len(self.group)))
 
 
 _KEPT: dict[int, tuple[Machine, Hulls]] = {}

@@ -4,12 +4,12 @@ Motions are the joints, then the left and the right track: m = n + 2. Directions
 positive). Of all concerns the most restrictive wins; a motion is limited only where it approaches.
 
     Mäkinen 2021, Eq. (3.11) corrected:  fraction = (p - p_l) / (p_u - p_l)      in `scaling`
-    ours:   c s + 1/2 b s^2 <= min(room / 2, room - w (T + v / a)),  s = v T + v^2 / (2 a)
+    ours:   c s + 1/2 b s^2 <= min(share room, room - w (T + v / a)),  s = v T + v^2 / (2 a)
 
 c, b: slope and bend of a row of `approach`; w: closing speed of the partner, which is taken to keep
 its present velocity while this machine brakes. T: age of the data, way of the command, lag of the
-hydraulics. The half: the partner may start at the same moment, seen only later; when either stops
-within half of the room, both stop apart.
+hydraulics. share: half beside a partner, who may start at the same moment, seen only later; when
+either stops within half of the room, both stop apart. All of it beside what stands still.
 """
 
 from __future__ import annotations
@@ -25,8 +25,6 @@ from backend.safety.braking import accelerations, braking_speed, full_speeds
 from backend.safety.record import Concern, Level
 from backend.spatial.types import Array
 
-SHARE = 0.5
-"""Part of the room between two machines that one of them may use."""
 CUSHION = np.radians(0.5)
 """Joints stop this far before their ends [rad]."""
 STALE = 0.25
@@ -114,7 +112,7 @@ def _braking(machine: Machine, part: Approach, T: Array) -> tuple[Array, list[li
     full = full_speeds(machine)
     speed, row = limit_kernels.single(
         part.room, part.slope, part.bend, part.closing, part.rates, full, T,
-        accelerations(machine), SHARE,
+        accelerations(machine), part.share,
     )  # fmt: skip
     reasons = [[why(part, int(r)) if r >= 0 else "" for r in pair] for pair in row]
     return speed / full[:, None], reasons
@@ -146,7 +144,7 @@ def at_once(machine: Machine, wish: Array, found: Limits) -> tuple[Array, dict[i
     for name, part, T in found.parts:
         speed, row = limit_kernels.together(
             speed, part.room, part.slope, part.bend, part.closing, part.rates, T,
-            accelerations(machine), SHARE,
+            accelerations(machine), part.share,
         )  # fmt: skip
         causes.update({k: Cause(name, why(part, int(r))) for k, r in enumerate(row) if r >= 0})
     return speed, causes

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from backend.machine.model import Machine
+from backend.safety import site
 from backend.safety.partner import part
 from backend.safety.record import Concern, Level
 
@@ -40,6 +41,8 @@ def line(concern: Concern, labels: dict[str, str]) -> str:
     own = labels.get(concern.machine, concern.machine.upper())
     other_machine, _, _ = evidence.other.partition(":")
     other = f"{labels.get(other_machine, other_machine.upper())} {part(evidence.other)}"
+    if concern.name == site.NAME:
+        other = part(evidence.other)
     value = f"{max(evidence.distance, 0.0):.2f} m"
     return _fit(f"{concern.level.name} · {own} {part(evidence.own)} ↔ {other} · {value}")
 

@@ -49,6 +49,46 @@ def test_agrees_with_coal_on_random_pairs() -> None:
     np.testing.assert_allclose(lengths[apart], ours[apart], atol=1e-12)
 
 
+def enumerated(a: Boxes, b: Boxes, k: int) -> float:
+    """Every corner against the other box, every edge against every edge; for separated boxes."""
+    best = np.inf
+    corners = a.corners()[k], b.corners()[k]
+    for one, points in ((b, corners[0]), (a, corners[1])):
+        local = np.abs((points - one.centers[k]) @ one.rotations[k]) - one.half_extents[k]
+        best = min(best, np.linalg.norm(np.maximum(local, 0.0), axis=1).min())
+    edges = [(i, i | 1 << bit) for bit in range(3) for i in range(8) if not i >> bit & 1]
+    first, last = np.array(edges).T
+    p, u = (v[:, None] for v in (corners[0][first], corners[0][last] - corners[0][first]))
+    q, v = corners[1][first][None], (corners[1][last] - corners[1][first])[None]
+    s = np.zeros((12, 12, 1))
+    uu, vv, uv = (np.sum(x * y, axis=2, keepdims=True) for x, y in ((u, u), (v, v), (u, v)))
+    w = p - q
+    det = uu * vv - uv * uv
+    uw, vw = np.sum(u * w, axis=2, keepdims=True), np.sum(v * w, axis=2, keepdims=True)
+    apart = det > 1e-12 * uu * vv
+    s = np.where(apart, (uv * vw - vv * uw) / np.where(apart, det, 1.0), 0.0).clip(0.0, 1.0)
+    t = ((uv * s + vw) / vv).clip(0.0, 1.0)
+    s = ((uv * t - uw) / uu).clip(0.0, 1.0)
+    return float(min(best, np.linalg.norm(w + s * u - t * v, axis=2).min()))
+
+
+def test_leaving_out_edges_that_are_turned_away_loses_nothing() -> None:
+    """All features of thick, thin and parallel boxes, near and far."""
+    rng = np.random.default_rng(12)
+    n, count = 700, 0
+    boxes = []
+    for _ in range(2):
+        half = 10.0 ** rng.uniform(-3.0, 0.5, (n, 3))
+        turns = rotation.from_quaternion(rng.normal(size=(n, 4)))
+        turns[: n // 3] = rotation.rz(0.3)
+        boxes.append(Boxes(rng.uniform(-2.5, 2.5, (n, 3)), turns, half))
+    ours, _ = box_distance.distances(*boxes)
+    for k in np.flatnonzero(ours > 0.0):
+        assert ours[k] == pytest.approx(enumerated(*boxes, k), abs=1e-12)
+        count += 1
+    assert count > 250
+
+
 def test_closest_points_lie_on_their_boxes() -> None:
     rng = np.random.default_rng(2)
     a, b = random_boxes(rng, 500), random_boxes(rng, 500)

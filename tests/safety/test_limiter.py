@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from backend.machine.load import load_machine
 from backend.safety import partner
-from backend.safety.approach import Approach
+from backend.safety.approach import SHARE, Approach
 from backend.safety.braking import (
     accelerations,
     braking_speed,
@@ -30,7 +30,7 @@ from backend.safety.limiter import (
     limit,
     open_latch,
 )
-from backend.safety.limits import SHARE, STALE, Delay
+from backend.safety.limits import STALE, Delay
 from backend.safety.record import Concern, Level
 
 MACHINE = load_machine("mini")

@@ -36,6 +36,7 @@ from backend.shell.sim.careless import SETTLE, Careless, Hands, bodies_of, faste
 from backend.shell.sim.dynamics import Demand, Hydraulics, SimState
 from backend.shell.sim.radio import OnAir, Radio, receive, send
 from backend.shell.sim.sensors import Sensor, sensors
+from backend.site.bodies import NO_SITE_BODIES, SiteBodies
 from backend.site.site import Site, load_site
 
 DT = 0.01  # of the simulated machines [s]
@@ -100,16 +101,22 @@ class _Machine:
     driven: float = 0.0
 
 
-def drive(plan: Drive, hands: Sequence[Hands] | None = None) -> Outcome:
-    """Runs one drive until its end or the first contact.
+def drive(
+    plan: Drive,
+    hands: Sequence[Hands] | None = None,
+    bodies: SiteBodies = NO_SITE_BODIES,
+    start: Sequence[SimState] | None = None,
+) -> Outcome:
+    """Runs one drive until its end or the first contact, of the machines or with the site.
 
-    hands: of both operators, careless ones when None.
+    hands: of both operators, careless ones when None; bodies: what stands on the site; start: of
+    both machines, somewhere within each other's reach when None.
     """
     site = load_site("demo")
     site = replace(site, sim=site.sim.model_copy(update={"joint_period": DT}))
     rng = np.random.default_rng((plan.seed, 7))
     machines = [machine_of(model) for model in plan.models]
-    states = placed(machines, rng)
+    states = start or placed(machines, rng)
     fleet = [
         _machine(name, machine, state, site, plan.seed)
         for name, machine, state in zip(NAMES, machines, states, strict=True)
@@ -122,6 +129,7 @@ def drive(plan: Drive, hands: Sequence[Hands] | None = None) -> Outcome:
         limits=Band(site.safety.slow_below, site.safety.stop_below),
         eta=site.safety.eta,
         mode="DEMO",
+        site=bodies,
         margins=False,
     )
     radios = Radio(site.sim.radio_period, plan.down), Radio(site.sim.radio_period, plan.up)
@@ -155,7 +163,11 @@ def drive(plan: Drive, hands: Sequence[Hands] | None = None) -> Outcome:
             outcome.driven.append((fleet[0].driven, fleet[1].driven))
         if t >= safe_until:
             first, second = (bodies_of(m.machine, m.state) for m in fleet)
-            touches, apart = contact(first, second)
+            found = [
+                contact(first, second),
+                *(contact(one, bodies.boxes) for one in (first, second)),
+            ]
+            touches, apart = any(hit for hit, _ in found), min(gap for _, gap in found)
             outcome.nearest = min(outcome.nearest, apart)
             if touches:
                 outcome.contact = t
