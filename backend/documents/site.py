@@ -8,6 +8,7 @@ from typing import Any
 from backend.machine.model import Machine
 from backend.pipeline.config import Config
 from backend.site.site import Site
+from backend.site.tables import SiteMachine
 
 
 def site_document(site: Site, config: Config) -> dict[str, Any]:
@@ -26,7 +27,10 @@ def site_document(site: Site, config: Config) -> dict[str, Any]:
         },
         "sun": {"m": site.sun.m, "n": site.sun.n, "eta": site.sun.eta},
         "machines": {
-            name: machine_description(machine, config.labels[name])
+            name: {
+                **machine_description(machine, config.labels[name]),
+                "cameras": [] if config.mode == "PLAYBACK" else cameras(site.machine(name)),
+            }
             for name, machine in config.machines.items()
         },
         "obstacles": [
@@ -39,6 +43,18 @@ def site_document(site: Site, config: Config) -> dict[str, Any]:
             for k, name in enumerate(config.site.names)
         ],
     }
+
+
+def cameras(machine: SiteMachine) -> list[dict[str, Any]]:
+    """What a page may know of a machine's cameras: addresses only where it goes there itself."""
+    return [
+        {
+            "kind": camera.kind,
+            "label": camera.label,
+            "url": camera.url if camera.kind == "whep" else None,
+        }
+        for camera in machine.camera
+    ]
 
 
 def machine_description(machine: Machine, label: str) -> dict[str, Any]:
