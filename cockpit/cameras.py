@@ -12,10 +12,10 @@ from backend.site.cameras import Camera
 from backend.site.site import Site
 
 
-def make_cameras(site: Site, session: Any) -> dict[tuple[str, int], SharedCamera]:
-    """By machine and index; those that a page opens by itself are not among them."""
+def make_cameras(site: Site, session: Any) -> dict[str, SharedCamera]:
+    """By "machine/index"; those that a page opens by itself are not among them."""
     return {
-        (machine.name, index): SharedCamera(_source(camera, session, machine.prefix))
+        f"{machine.name}/{index}": SharedCamera(_source(camera, session, machine.prefix))
         for machine in site.machines
         for index, camera in enumerate(machine.camera)
         if camera.kind != "whep"

@@ -29,8 +29,8 @@ MOST_VIEWERS = 32  # of one camera
 MAX_MESSAGE = 256  # from a page [bytes]
 
 
-def camera_router(cameras: Mapping[tuple[str, int], SharedCamera]) -> APIRouter:
-    """The websocket /api/camera/{machine}/{index}. cameras: by machine and index on the site.
+def camera_router(cameras: Mapping[str, SharedCamera]) -> APIRouter:
+    """The websocket /api/camera/{machine}/{index}. cameras: by "machine/index".
 
     Sent are frames as those of the page's own websocket: {"type": "picture", "serial", "age" [s],
     "by": "capture" or "arrival", "wall"} with the array `jpeg`, and {"type": "trouble", "text"},
@@ -39,8 +39,8 @@ def camera_router(cameras: Mapping[tuple[str, int], SharedCamera]) -> APIRouter:
     router = APIRouter(include_in_schema=False)
 
     @router.websocket("/api/camera/{machine}/{index}")
-    async def camera(websocket: WebSocket, machine: str, index: int) -> None:
-        shared = cameras.get((machine, index))
+    async def camera(websocket: WebSocket, machine: str, index: str) -> None:
+        shared = cameras.get(f"{machine}/{index}")
         if shared is None or not from_here(websocket):
             await websocket.close(REFUSED)
             return
@@ -74,7 +74,7 @@ async def _show(websocket: WebSocket, shared: SharedCamera, viewer: Viewer) -> N
 
 
 class _Window:
-    """sent: pictures sent; drawn: how many of them the page has done with."""
+    """Pictures sent to a page that it has not said it is done with."""
 
     def __init__(self) -> None:
         self.serials: list[int] = []

@@ -36,7 +36,7 @@ class Viewer:
 
 
 class SharedCamera:
-    """source: opens a connection and yields its pictures; it raises CameraGoneError when it ends."""
+    """source: opens a connection and yields its pictures; raises CameraGoneError at its end."""
 
     def __init__(
         self,

@@ -16,8 +16,8 @@ from backend.spatial.types import AnyArray, Array
 
 PITCH = math.radians(-18.0)
 BELOW_ROOF = 0.25  # of the cab's height, where the sidecar does not say where the eyes are
-PAINTS: AnyArray = np.array([[240, 184, 52], [148, 182, 208], [196, 174, 220], [166, 204, 170]])
-"""Of the machines in the site's order, near their colours in the 3D scene."""
+PAINTS: AnyArray = np.array([[210, 195, 148], [159, 185, 204], [191, 176, 207], [169, 196, 172]])
+"""Of the machines in the site's order, as in the 3D scene: none can be taken for a level's."""
 IRON: AnyArray = np.array([58, 60, 64])
 STEEL: AnyArray = np.array([104, 108, 112])
 CONCRETE: AnyArray = np.array([150, 148, 142])

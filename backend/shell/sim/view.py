@@ -20,9 +20,9 @@ from backend.spatial.types import AnyArray, Array
 NEAR = 0.15  # what is closer is not drawn [m]
 FADING = 35.0  # contrast falls to 1/e over this distance [m]
 SUN: Array = np.array([0.35, -0.45, 0.82])  # towards the light, site frame
-GROUND: AnyArray = np.array([[122, 106, 84], [109, 94, 74]])  # squares of 1 m
-SKY: AnyArray = np.array([118, 146, 176])
-HAZE: AnyArray = np.array([176, 186, 192])
+GROUND: AnyArray = np.array([[104, 100, 92], [92, 89, 82]])  # squares of 1 m
+SKY: AnyArray = np.array([104, 122, 140])
+HAZE: AnyArray = np.array([146, 153, 158])
 FARTHEST = 1000.0  # [m]
 STEPS = 96  # of fading
 _FACES = (
