@@ -54,6 +54,7 @@ LIBRARIES: dict[str, str | tuple[str, ...]] = {
     "can": ("backend.shell.session", "backend.shell.agent"),
     "cantools": ("backend.shell.session", "backend.shell.agent"),
     "pyarrow": "backend.shell.session",
+    "PIL": "backend.shell.sim",
     "fastapi": "backend.shell.app",
     "fastapi_offline": "backend.shell.app",
     "starlette": "backend.shell.app",
@@ -126,6 +127,7 @@ def test_every_import_is_a_declared_dependency(repository: Path) -> None:
     aliases = {
         "argon2-cffi": "argon2",
         "eclipse-zenoh": "zenoh",
+        "pillow": "PIL",
         "python-can": "can",
         "python-fcl": "fcl",
         "pyyaml": "yaml",

@@ -20,7 +20,6 @@ from backend.machine.model import Machine
 from backend.shell.link.codec import DecodeError, decode
 from backend.shell.link.encode import encode_picture
 from backend.shell.link.messages import TrueState
-from backend.shell.link.session import zenoh_priority
 from backend.shell.link.topics import key, topic
 from backend.shell.sim.cab import Seen, Surroundings, cab_view
 from backend.shell.sim.dynamics import SimState
@@ -112,13 +111,7 @@ class CabCamera:
             query = self._asked.popleft()
             with query:
                 if not self._cut():
-                    row = topic("camera")
-                    query.reply(
-                        str(query.key_expr),
-                        payload,
-                        priority=zenoh_priority(row),
-                        express=row.express,
-                    )
+                    query.reply(str(query.key_expr), payload, express=topic("camera").express)
 
     def _drop_all(self) -> None:
         while self._asked:

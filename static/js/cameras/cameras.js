@@ -22,7 +22,7 @@ export function toggleCameras() {
 /** One machine: only the own one's panels and camera. Two: the partner's beside it. */
 export function toggleMachines() {
   if (names().length < 2) return;
-  change({ machines: prefs.machines === "two" ? "one" : "two", large: "" });
+  change({ machines: prefs.machines === "two" ? "one" : "two", large: prefs.large === "partner" ? "" : prefs.large });
   update();
 }
 

@@ -22,7 +22,7 @@ export function slot(side, act) {
   const word = make("b"), why = make("span", { role: "status" });
   const veil = make("p", { class: "veil" }, word, why);
   const node = make("div", { class: "camera", id: `camera-${side}`, role: "group", hidden: "" },
-    canvas, video, veil, make("header", {}, name, age, next, size, hide));
+    make("header", {}, name, age, next, size, hide), canvas, video, veil);
   next.addEventListener("click", () => act.next(side));
   size.addEventListener("click", () => act.enlarge(side));
   hide.addEventListener("click", () => act.hide());
