@@ -15,7 +15,9 @@ from backend.site.site import Site
 def make_cameras(site: Site, session: Any) -> dict[str, SharedCamera]:
     """By "machine/index"; those that a page opens by itself are not among them."""
     return {
-        f"{machine.name}/{index}": SharedCamera(_source(camera, session, machine.prefix))
+        f"{machine.name}/{index}": SharedCamera(
+            _source(camera, session, machine.prefix), patient=camera.kind == "link"
+        )
         for machine in site.machines
         for index, camera in enumerate(machine.camera)
         if camera.kind != "whep"

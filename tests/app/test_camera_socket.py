@@ -50,9 +50,9 @@ class Served:
 
 
 @pytest.fixture
-def served() -> Iterator[Served]:
+def served(request: pytest.FixtureRequest) -> Iterator[Served]:
     lens = Lens()
-    camera = SharedCamera(lens)
+    camera = SharedCamera(lens, patient=getattr(request, "param", False))
     app = FastAPI()
     app.include_router(camera_router({"left/0": camera}))
     server = WebServer(app, bind("127.0.0.1", 0))
@@ -94,6 +94,19 @@ def test_who_says_nothing_gets_no_more_and_who_is_slow_the_newest(served: Served
         assert number(jpeg) >= newest
         assert header["by"] == "capture"
         assert 0.0 <= header["age"] < 5.0
+
+
+@pytest.mark.parametrize("served", [True], indirect=True)
+def test_a_patient_camera_takes_no_picture_that_nobody_is_ready_for(served: Served) -> None:
+    with served.open() as page:
+        serials = [receive(page)[0]["serial"] for _ in range(IN_FLIGHT)]
+        time.sleep(0.3)
+        shown = served.lens.shown
+        assert shown <= IN_FLIGHT + 1
+        time.sleep(0.2)
+        assert served.lens.shown == shown
+        page.send(json.dumps({"drawn": serials[-1]}))
+        assert receive(page)[0]["serial"] > serials[-1]
 
 
 def test_trouble_is_told_and_its_end_too(served: Served) -> None:

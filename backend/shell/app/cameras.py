@@ -101,6 +101,7 @@ async def _send(
         if picture is not None and picture.serial != shown and window.open:
             shown = picture.serial
             window.serials.append(shown)
+            viewer.ready = window.open
             await websocket.send_bytes(_frame(picture))
 
 
@@ -113,6 +114,7 @@ async def _receive(websocket: WebSocket, viewer: Viewer, window: _Window) -> Non
             message = json.loads(text)
             if isinstance(message, dict) and isinstance(message.get("drawn"), int):
                 window.drawn(message["drawn"])
+                viewer.ready = window.open
                 viewer.changed.set()
 
 

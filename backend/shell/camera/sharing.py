@@ -18,6 +18,7 @@ from backend.shell.camera.multipart import Part
 log = logging.getLogger(__name__)
 
 FIRST_WAIT, LONGEST_WAIT = 0.5, 8.0  # between two attempts [s]
+READY = 0.02  # how often viewers that are not ready are looked at [s]
 STEADY = 5.0  # a connection that held for so long begins again with the first wait [s]
 
 Pictures = AsyncGenerator[Part, None]
@@ -28,23 +29,31 @@ class CameraGoneError(Exception):
 
 
 class Viewer:
-    """Somebody who watches. changed: set when there is a newer picture or something else to say."""
+    """Somebody who watches. changed: set when there is a newer picture or something else to say;
+    ready: whether there is room for another picture.
+    """
 
     def __init__(self) -> None:
+        self.ready = True
         self.changed = asyncio.Event()
         self.changed.set()
 
 
 class SharedCamera:
-    """source: opens a connection and yields its pictures; raises CameraGoneError at its end."""
+    """source: opens a connection and yields its pictures; raises CameraGoneError at its end.
+
+    patient: each picture costs the other end something, so the next is taken when a viewer is
+    ready for it. A stream that is not read would only grow old on the way.
+    """
 
     def __init__(
         self,
         source: Callable[[], Pictures],
+        patient: bool = False,
         clock: Callable[[], float] = time.monotonic,
         wall: Callable[[], float] = time.time,
     ) -> None:
-        self._source = source
+        self._source, self._patient = source, patient
         self._clock, self._wall = clock, wall
         self._viewers: set[Viewer] = set()
         self._task: asyncio.Task[None] | None = None
@@ -98,6 +107,8 @@ class SharedCamera:
                     serial = 1 if self.picture is None else self.picture.serial + 1
                     self.picture = Picture(part.jpeg, when, stamps.by, serial)
                     self._tell("")
+                while self._patient and not any(viewer.ready for viewer in self._viewers):
+                    await asyncio.sleep(READY)
 
     def _tell(self, trouble: str) -> None:
         self.trouble = trouble

@@ -23,7 +23,6 @@ export function openPictures(machine, index, canvas) {
       feed.count += 1;
       feed.taken = arrival - 1000 * (header.age + transit(header.wall));
       feed.by = header.by;
-      feed.trouble = "";
     } catch {
       feed.trouble = "the picture cannot be decoded";
     }
@@ -40,7 +39,10 @@ export function openPictures(machine, index, canvas) {
       try {
         const { header, arrays } = decode(event.data);
         if (header.type === "trouble") feed.trouble = header.text;
-        else if (header.type === "picture") draw(header, arrays.jpeg.data, performance.now());
+        else if (header.type === "picture") {
+          feed.trouble = "";
+          draw(header, arrays.jpeg.data, performance.now());
+        }
       } catch {
         feed.trouble = "the picture cannot be read";
       }
