@@ -18,6 +18,7 @@ from backend.errors import InputError
 from backend.pipeline.records import Inputs, Notice, Snapshot
 from backend.shell.alarm_log import AlarmLog
 from backend.shell.app.app import Sources, create_app
+from backend.shell.app.cameras import camera_router
 from backend.shell.app.feed import Frames
 from backend.shell.app.metrics import metrics_router
 from backend.shell.app.server import WebServer, bind
@@ -31,6 +32,7 @@ from backend.shell.link.source import LinkSource
 from backend.shell.runner import Runner
 from backend.shell.session.recorder import Recorder
 from backend.site.site import Site
+from cockpit.cameras import make_cameras, whep_origins
 from cockpit.desk import Desk, image_loops, load_models, make_config, may_say
 from cockpit.driving import make_driving
 from cockpit.options import Options
@@ -135,8 +137,10 @@ class Station:
             hosts=options.entry.hosts,
             routers=(
                 metrics_router(frames, self.backend, self._recorded, options.entry.metrics_token),
+                camera_router(make_cameras(site, session)),
             ),
             access=access,
+            streams=whep_origins(site),
         )
         self.web = WebServer(app, listener, options.entry.tls)
         self.recorder.start()

@@ -65,6 +65,7 @@ LIBRARIES: dict[str, str | tuple[str, ...]] = {
     "lxml": "backend.gauge",
     "ifcopenshell": "backend.gauge",
     "pyarrow": "backend.shell.session",
+    "PIL": "backend.shell.sim",
     "fastapi": "backend.shell.app",
     "fastapi_offline": "backend.shell.app",
     "starlette": "backend.shell.app",
@@ -137,6 +138,7 @@ def test_every_import_is_a_declared_dependency(repository: Path) -> None:
     aliases = {
         "argon2-cffi": "argon2",
         "eclipse-zenoh": "zenoh",
+        "pillow": "PIL",
         "python-can": "can",
         "python-fcl": "fcl",
         "pyyaml": "yaml",

@@ -9,6 +9,7 @@ from backend.documents.limit_volumes import volumes_document
 from backend.machine.model import Machine
 from backend.pipeline.config import Config
 from backend.site.site import Site
+from backend.site.tables import SiteMachine
 
 
 def site_document(site: Site, config: Config) -> dict[str, Any]:
@@ -28,7 +29,10 @@ def site_document(site: Site, config: Config) -> dict[str, Any]:
         },
         "sun": {"m": site.sun.m, "n": site.sun.n, "eta": site.sun.eta},
         "machines": {
-            name: machine_description(machine, config.labels[name])
+            name: {
+                **machine_description(machine, config.labels[name]),
+                "cameras": [] if config.mode == "PLAYBACK" else cameras(site.machine(name)),
+            }
             for name, machine in config.machines.items()
         },
         "obstacles": [
@@ -42,6 +46,18 @@ def site_document(site: Site, config: Config) -> dict[str, Any]:
         ],
         "gauge": volumes_document(config.site),
     }
+
+
+def cameras(machine: SiteMachine) -> list[dict[str, Any]]:
+    """What a page may know of a machine's cameras: addresses only where it goes there itself."""
+    return [
+        {
+            "kind": camera.kind,
+            "label": camera.label,
+            "url": camera.url if camera.kind == "whep" else None,
+        }
+        for camera in machine.camera
+    ]
 
 
 def machine_description(machine: Machine, label: str) -> dict[str, Any]:

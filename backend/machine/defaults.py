@@ -13,7 +13,7 @@ from backend.errors import InputError
 from backend.machine import bodies, kinematics
 from backend.machine.chain import root_poses
 from backend.machine.meshes import triangles_of
-from backend.machine.model import PARTS, ROLES, Antenna, Joint, Link, Machine, Tracks
+from backend.machine.model import PARTS, ROLES, Antenna, Eye, Joint, Link, Machine, Tracks
 from backend.machine.roles import marks_end
 from backend.machine.sidecar import PointOnLink, SelfCollision, Sidecar, TracksTable
 from backend.machine.urdf import Description, UrdfLink
@@ -75,6 +75,14 @@ def _surface(stated: UrdfLink, link: Link, robot_file: Path) -> list[Array]:
     if link.visuals:
         return [visual.vertices[visual.faces] for visual in link.visuals]
     return [triangles_of(c, robot_file.parent, str(robot_file)) for c in stated.collisions]
+
+
+def eye(machine: Machine, stated: PointOnLink | None, file: str) -> Eye | None:
+    """The eyes in the cab where the sidecar states them."""
+    if stated is None:
+        return None
+    index = {link.name: i for i, link in enumerate(machine.links)}
+    return Eye(*_point(stated, index, file, "eye"))
 
 
 def antenna(machine: Machine, stated: PointOnLink | None, file: str, notes: list[str]) -> Antenna:

@@ -99,6 +99,7 @@ def load_machine(
         antenna=defaults.antenna(machine, side.gnss, side_name, notes),
         tracks=defaults.tracks(machine, side.tracks, notes),
         self_pairs=defaults.self_pairs(machine, side.self_collision, side_name, notes),
+        eye=defaults.eye(machine, side.eye, side_name),
     )
     if side.heading is None:
         notes.append("the heading sensor is taken to turn with the upper body")

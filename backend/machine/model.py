@@ -113,6 +113,16 @@ class Antenna:
 
 
 @dataclass(frozen=True)
+class Eye:
+    """Where the eyes of who sits in the cab are, looking along the arm's plane. link: index into
+    Machine.links; position: (3,) in that link's frame [m].
+    """
+
+    link: int
+    position: Array
+
+
+@dataclass(frozen=True)
 class Tracks:
     """Travel of the tracks. length, gauge (centre to centre), shoe width [m]; speed [m/s]."""
 
@@ -147,6 +157,7 @@ class Machine:
     self_pairs: tuple[tuple[int, int], ...]  # body indices that count as self-collision
     max_reach: float  # from the swing axis, joint limits ignored (Sun) [m]
     assumptions: tuple[str, ...] = field(default=())
+    eye: Eye | None = None  # where the sidecar says it
 
     @property
     def lower(self) -> Array:

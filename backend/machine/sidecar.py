@@ -102,6 +102,7 @@ class Sidecar(Table):
     limits: dict[Role, Limit] = {}
     end_point: PointOnLink | None = None
     gnss: PointOnLink | None = None
+    eye: PointOnLink | None = None
     heading: Heading | None = None
     tracks: TracksTable | None = None
     bodies: BodiesTable = BodiesTable()
@@ -144,6 +145,7 @@ def _fields_at(place: list[str]) -> list[str]:
     inner: dict[str, type[BaseModel]] = {
         "end_point": PointOnLink,
         "gnss": PointOnLink,
+        "eye": PointOnLink,
         "heading": Heading,
         "tracks": TracksTable,
         "limits": Limit,

@@ -22,6 +22,7 @@ from backend.site.base import (
     Tilt,
     Vector,
 )
+from backend.site.cameras import MOST, Camera, as_list
 from backend.site.gauge_tables import Gauge
 from backend.site.others import Can, MachineTopics, refuse_shared_topics
 from backend.spatial.rotation import rz
@@ -122,12 +123,14 @@ class SiteMachine(Table):
     prefix: Prefix = ""
     start: Start | None = None
     topics: MachineTopics = MachineTopics()
+    camera: Annotated[tuple[Camera, ...], Field(max_length=MOST)] = ()
     sim: MachineSim = MachineSim()
 
     @model_validator(mode="before")
     @classmethod
     def _named_after(cls, table: Any) -> Any:
-        """Label and prefix default to the name."""
+        """Label and prefix default to the name; one camera needs no list."""
+        table = as_list(table) if isinstance(table, dict) else table
         if isinstance(table, dict) and isinstance(table.get("name"), str):
             name = table["name"]
             return {"label": name.upper().replace("_", " "), "prefix": name, **table}

@@ -29,6 +29,7 @@ import * as sheets from "./sheets.js";
 import * as transport from "./transport.js";
 import * as recording from "./recording.js";
 import { recall, startLayout, toggleFullScreen, toggleLayout } from "./layout.js";
+import { startCameras, toggleCameras, toggleMachines, update as updatePictures } from "./cameras/cameras.js";
 import * as watermark from "./watermark.js";
 import { startSeries } from "./series_pointer.js";
 import { sessionKey } from "./keys.js";
@@ -90,6 +91,8 @@ function onKey(event) {
   else if (event.key === "t" || event.key === "T") plots.plan.turning();
   else if (event.key === "v" || event.key === "V") toggleLayout();
   else if (event.key === "f" || event.key === "F") toggleFullScreen();
+  else if (event.key === "c" || event.key === "C") toggleCameras();
+  else if (event.key === "b" || event.key === "B") toggleMachines();
   else if (sessionKey(event)) event.stopPropagation(); // the scene's own keys would turn its camera
   else if (event.key === "Escape") {
     sheets.close();
@@ -118,6 +121,7 @@ document.addEventListener("keydown", onKey);
 document.addEventListener("keyup", drive.onKeyUp);
 $("help-open").addEventListener("click", help);
 startLayout(resized);
+startCameras();
 function resized() {
   readSizes();
   for (const s of [...live, ...images]) s.dirty = true;
@@ -173,6 +177,7 @@ function tick() {
   topbar.update();
   demo.update();
   updateCameras(socket.send);
+  updatePictures();
   const subject = `${label(state.own)}`;
   const age = snapshotAge();
   const present = shown() === "sun" ? image() : exactImage();

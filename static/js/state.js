@@ -150,6 +150,9 @@ export function snapshotAge() {
   return Math.max(0, s.time - (s.state_time ?? s.time)) + delay + waited();
 }
 
+/** How much longer than the quickest message one took that the server sent at `sent` [s since 1970]. */
+export const transit = (sent) => (Number.isFinite(minimumDelay) ? Math.max(0, Date.now() / 1000 - sent - minimumDelay) : 0);
+
 /** Age of an image's state, by the server's clock as the newest snapshot carries it. */
 export function imageAge(entry) {
   if (!entry || !state.snapshot) return Infinity;

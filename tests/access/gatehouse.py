@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import threading
 from collections.abc import Iterator
@@ -23,11 +24,14 @@ from backend.shell.access.links import Links
 from backend.shell.access.sessions import Sessions
 from backend.shell.access.users import Users, add_user, read_users, seal_of
 from backend.shell.app.app import Sources, create_app
+from backend.shell.app.cameras import camera_router
 from backend.shell.app.feed import Frames
 from backend.shell.app.recording import RecordingSources
 from backend.shell.app.server import WebServer, bind
 from backend.shell.app.session_api import session_router
 from backend.shell.app.viewer_proxy import Hooks, viewer_router
+from backend.shell.camera.multipart import Part
+from backend.shell.camera.sharing import Pictures, SharedCamera
 from backend.shell.hub import Hub
 
 PROTOCOL = Subprotocol("viser-v1.1.1")
@@ -53,6 +57,12 @@ class Playback:
 
     def file(self, kind: str) -> Path:
         raise AssertionError(f"{kind}: nobody asks for a file here")
+
+
+async def dark() -> Pictures:
+    """A camera that shows nothing."""
+    await asyncio.sleep(3600.0)
+    yield Part(b"", None)
 
 
 class Clock:
@@ -174,7 +184,7 @@ def house(
         sources,
         viewer_router(lambda: scene.port, hooks or Hooks()),
         hosts=("127.0.0.1", "localhost"),
-        routers=(session_router(Playback()),),
+        routers=(session_router(Playback()), camera_router({"x/x": SharedCamera(dark)})),
         access=access,
     )
     listener = bind("127.0.0.1", 0)

@@ -63,7 +63,7 @@ def test_the_routes_are_those_we_know(closed: House) -> None:
     assert {"/", "/ws", "/view", "/view/x"} <= known | set(sockets(closed))
     assert {"/api/docs", "/api/openapi.json", "/api/recording/pin", "/api/session/export"} <= known
     assert {"/view/", "/view/x/", "/static/index.html", "/api/logout", "/api/me"} <= known
-    assert set(sockets(closed)) == {"/ws", "/view", "/view/x"}
+    assert set(sockets(closed)) == {"/ws", "/view", "/view/x", "/api/camera/x/x"}
 
 
 def test_nothing_answers_without_a_session(closed: House) -> None:

@@ -275,7 +275,8 @@ def test_every_row_of_the_table_is_in_the_rules_of_both_ends() -> None:
     for row in TOPICS:
         if row.direction is Direction.FROM_COCKPIT:
             continue
-        key = row.template.replace("{machine}", "plant/left").replace("{link}", "*")
+        key = row.template.replace("{machine}", "plant/left")
+        key = key.replace("{link}", "*").replace("{camera}", "*")
         message = "reply" if row.queryable else "put"
         from_machine = row.direction is Direction.FROM_MACHINE
         for own, flow in (("cockpit", from_machine), ("left", not from_machine)):

@@ -22,7 +22,7 @@ from backend.shell.link.topics import (
 from backend.shell.link.topics_table import topics_markdown
 from backend.shell.link.typestore import TYPESTORE
 
-FIELDS = {"machine": "left", "link": "boom", "kind": "sun"}
+FIELDS = {"machine": "left", "link": "boom", "kind": "sun", "camera": "cab"}
 
 
 def test_names_and_templates_are_unique():
@@ -69,7 +69,7 @@ def test_match_accepts_nothing_else(text):
     found = match(text)
     if found is not None:
         row, fields = found
-        assert row.template == "{machine}/" + text or row.name == "imu"
+        assert row.template == "{machine}/" + text or row.name in ("imu", "camera")
         assert key(row.name, "left", **fields) == "left/" + text
 
 

@@ -38,6 +38,7 @@ def load(path, text):
         ("[end_point]\nlink = 'tooth'\nposition = [0, 0, 0]", ["end_point.link", "tooth"]),
         ("[end_point]\nlink = 'bucket'\nposition = [0, 0]", ["end_point.position"]),
         ("[gnss]\nlink = 'mast'\nposition = [0, 0, 0]", ["gnss.link", "mast", "house"]),
+        ("[eye]\nlink = 'mast'\nposition = [0, 0, 0]", ["eye.link", "mast", "house"]),
         ("[heading]\nof = 'bucket'", ["heading.of", "bucket", "tracks"]),
         ("[limits.boom]\nlower_deg = 50\nupper_deg = -50", ["boom"]),
         ("[limits.boom]\nmax_velocity_deg = 0", ["limits.boom.max_velocity_deg", "0"]),

@@ -62,6 +62,7 @@ def create_app(
     hosts: tuple[str, ...] = ("*",),
     routers: tuple[APIRouter, ...] = (),
     access: Access | None = None,
+    streams: tuple[str, ...] = (),
 ) -> FastAPI:
     """The application. viewer: routes of the 3D view, served below /view; routers: more routes.
 
@@ -69,6 +70,7 @@ def create_app(
     name, so that a foreign name that resolves to the loopback leads nowhere.
     access: who may do what; every websocket and request that passes it has `state.person`. Without
     it nobody is asked and nobody is known: state.person is None.
+    streams: origins of cameras that the page opens by itself.
     """
     app: FastAPI = FastAPIOffline(  # its documentation page needs no network
         title="Excavator cockpit",
@@ -83,7 +85,8 @@ def create_app(
     if access is not None:
         app.add_middleware(Gate, access=access)
     app.add_middleware(TrustedHostMiddleware, allowed_hosts=list(hosts))
-    app.add_middleware(SecurityHeaders, https=access is not None and access.https)
+    https = access is not None and access.https
+    app.add_middleware(SecurityHeaders, https=https, streams=streams)
     app.state.access = access
     feed = Feed(sources.frames, sources.site, sources.on_message, sources.seats)
     hub = sources.frames.hub

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -301,6 +301,14 @@ class TracksModel(BaseModel):
     shoe: float = Field(description="width [m]")
 
 
+class CameraModel(BaseModel):
+    """A camera; its pictures come over the websocket /api/camera/{machine}/{index}."""
+
+    kind: Literal["mjpeg", "whep", "link"]
+    label: str
+    url: str | None = Field(description="WHEP only: where the page opens its WebRTC stream")
+
+
 class MachineDescriptionModel(BaseModel):
     """What does not change about a machine."""
 
@@ -315,6 +323,7 @@ class MachineDescriptionModel(BaseModel):
     bodies: int = Field(description="number of oriented boxes")
     masses_trusted: bool
     assumptions: list[str] = Field(description="what the description left open, as assumed")
+    cameras: list[CameraModel] = Field(description="empty in playback: pictures are not recorded")
 
 
 class FrameModel(BaseModel):

@@ -7,7 +7,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 PAGE_POLICY = (
     "default-src 'self'; img-src 'self' data: blob:; style-src 'self'; script-src 'self'; "
-    "connect-src 'self'; frame-src 'self'; frame-ancestors 'self'; base-uri 'none'; "
+    "connect-src 'self'{streams}; frame-src 'self'; frame-ancestors 'self'; base-uri 'none'; "
     "form-action 'self'"
 )
 ALWAYS = {
@@ -23,10 +23,13 @@ PAGES = ("/", "/login")
 
 
 class SecurityHeaders:
-    """ASGI middleware; what a route set itself stays. https: whether pages come over HTTPS."""
+    """ASGI middleware; what a route set itself stays. https: whether pages come over HTTPS;
+    streams: origins of other servers that the page may ask for a camera's stream.
+    """
 
-    def __init__(self, app: ASGIApp, https: bool) -> None:
+    def __init__(self, app: ASGIApp, https: bool, streams: tuple[str, ...] = ()) -> None:
         self._app, self._https = app, https
+        self._policy = page_policy(streams)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] != "http":
@@ -38,7 +41,7 @@ class SecurityHeaders:
             if message["type"] == "http.response.start":
                 headers = MutableHeaders(scope=message)
                 if path in PAGES or path.startswith("/static/"):
-                    headers.setdefault("Content-Security-Policy", PAGE_POLICY)
+                    headers.setdefault("Content-Security-Policy", self._policy)
                     headers.setdefault("Cache-Control", "no-cache")
                 for name, value in ALWAYS.items():
                     headers.setdefault(name, value)
@@ -47,6 +50,11 @@ class SecurityHeaders:
             await send(message)
 
         await self._app(scope, receive, with_headers)
+
+
+def page_policy(streams: tuple[str, ...] = ()) -> str:
+    """The Content-Security-Policy of pages. streams: see SecurityHeaders."""
+    return PAGE_POLICY.format(streams="".join(f" {origin}" for origin in streams))
 
 
 def _localhost(scope: Scope) -> bool:

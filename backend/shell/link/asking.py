@@ -19,11 +19,13 @@ def ask(
     on_answer: Callable[[bytes], None],
     on_end: Callable[[], None] = lambda: None,
     timeout: float = 1.0,
+    **fields: str,
 ) -> None:
     """Asks the row `name` of a machine (its key prefix). Returns at once.
 
     on_answer: called with each answer; on_end: called once, when no more answers can come; both in
-    a thread of Zenoh's. timeout [s]. Raises zenoh.ZError when the session is closed.
+    a thread of Zenoh's. timeout [s]; fields: the row's other one. Raises zenoh.ZError when the
+    session is closed.
     """
     row = topic(name)
 
@@ -32,7 +34,7 @@ def ask(
             on_answer(reply.ok.payload.to_bytes())
 
     session.get(
-        key(name, machine),
+        key(name, machine, **fields),
         zenoh.handlers.Callback(on_reply, on_end),
         payload=payload,
         timeout=timeout,

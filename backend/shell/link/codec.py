@@ -291,3 +291,17 @@ def decode_limits(machine: str, payload: bytes, arrival: float) -> MotionLimits:
         raise
     except Exception as error:  # whatever strangers' bytes provoke in the decoder
         raise DecodeError(f"limits: {error}") from error
+
+
+def decode_picture(payload: bytes) -> tuple[float, bytes]:
+    """The stamp [s] and the JPEG of an answer to a question for a picture. Raises DecodeError."""
+    try:
+        msg = _message(topic("camera"), payload)
+        stamp, jpeg = _stamp(msg), bytes(msg.data)
+    except DecodeError:
+        raise
+    except Exception as error:  # whatever strangers' bytes provoke in the decoder
+        raise DecodeError(f"camera: {error}") from error
+    if not jpeg.startswith(b"\xff\xd8"):
+        raise DecodeError(f"camera: {len(jpeg)} bytes that are no JPEG")
+    return stamp, jpeg

@@ -21,6 +21,7 @@ _JointState = TYPESTORE.types["sensor_msgs/msg/JointState"]
 _Imu = TYPESTORE.types["sensor_msgs/msg/Imu"]
 _NavSatFix = TYPESTORE.types["sensor_msgs/msg/NavSatFix"]
 _NavSatStatus = TYPESTORE.types["sensor_msgs/msg/NavSatStatus"]
+_Picture = TYPESTORE.types["sensor_msgs/msg/CompressedImage"]
 _PointStamped = TYPESTORE.types["geometry_msgs/msg/PointStamped"]
 _Command = TYPESTORE.types["cockpit_msgs/msg/JointVelocityCommand"]
 _Limits = TYPESTORE.types["cockpit_msgs/msg/MotionLimits"]
@@ -51,6 +52,11 @@ def _vector(values: Sequence[float] | Array) -> Any:
 def encode_clock(time: float) -> bytes:
     """builtin_interfaces/Time of `time` [s]."""
     return _bytes(_time(time))
+
+
+def encode_picture(stamp: float, frame: str, jpeg: bytes) -> bytes:
+    """sensor_msgs/CompressedImage of a JPEG that shows the time `stamp` [s]."""
+    return _bytes(_Picture(_header(stamp, frame), "jpeg", np.frombuffer(jpeg, dtype=np.uint8)))
 
 
 def encode_joint_states(

@@ -15,7 +15,7 @@ from backend.errors import InputError
 from backend.shell.link.link_config import check_partners, read_config, stated
 from backend.shell.link.topics import Topic, key, topic
 
-MODES = ("peer", "router")
+MODES = ("peer", "router", "client")
 BURST = 16
 PROTOCOLS = ("tcp", "tls", "quic", "ws", "udp")
 _ENDPOINT = re.compile(rf"({'|'.join(PROTOCOLS)})/(\[[0-9a-fA-F:.]+\]|[^\s/:#?]+):(\d+)([?#]\S*)?")
@@ -53,7 +53,8 @@ def open_session(
     """An open zenoh.Session that listens on and connects to the given endpoints only.
 
     mode: "peer" talks to whom it is connected; "router" also passes on between its neighbours, as
-    a backend does that shares its machines with others. Nothing is searched for by multicast.
+    a backend does that shares its machines with others; "client" is passed on to by a router, which
+    for peers it is not. Nothing is searched for by multicast.
     Endpoints in `connect` may be absent: they are tried again until they are there. config_file: a
     Zenoh configuration that holds where nothing is said here: keys, access control, and endpoints
     where none are given. Raises InputError for malformed endpoints, for addresses that cannot be

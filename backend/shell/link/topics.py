@@ -223,6 +223,21 @@ TOPICS: tuple[Topic, ...] = (
         "the machine's clock, asked for by round trips; without it ages are by arrival",
     ),
     Topic(
+        name="camera",
+        template="{machine}/camera/{camera}",
+        type="sensor_msgs/msg/CompressedImage",
+        rate="5",
+        priority=Priority.DATA_LOW,
+        congestion=Congestion.DROP,
+        express=False,
+        recorded=False,
+        direction=Direction.FROM_MACHINE,
+        max_bytes=1_048_576,
+        description="the newest picture of one camera, a JPEG stamped with the time it shows; "
+        "asked for, one at a time, while somebody watches",
+        queryable=True,
+    ),
+    Topic(
         name="truth",
         template="{machine}/truth",
         type="cockpit_msgs/msg/TrueState",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import threading
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,7 @@ from backend.shell.link.messages import TrueState
 from backend.shell.link.session import open_session, publisher
 from backend.shell.link.topics import key, topic
 from backend.shell.sim.agent import act, fresh
+from backend.shell.sim.camera import CabCamera
 from backend.shell.sim.dynamics import Hydraulics, SimState, limits_of, step
 from backend.shell.sim.program import Program, is_cut
 from backend.shell.sim.program_file import load_program
@@ -58,19 +60,24 @@ def run(
     session = open_session(connect=connect, config_file=link_config)
     try:
         began = time.time() if start_at is None else start_at
-        run_machine(site, name, machine, program, session, began, until, skew)
+
+        def beside() -> Any:
+            return open_session(connect=connect, mode="client", config_file=link_config)
+
+        run_machine(site, name, machine, program, session, began, until, skew, beside)
     finally:
         session.close()
 
 
 @dataclass
 class _Wire:
-    """Publishers by topic name, and the radio's messages."""
+    """Publishers by topic name, and the radio's messages; now: the newest state and its stamp."""
 
     outlets: dict[str, Any]
     radio: Radio
     on_air: tuple[OnAir[tuple[str, bytes]], ...] = ()
     cut: bool = False
+    now: tuple[SimState, float] | None = None
 
 
 def run_machine(
@@ -82,8 +89,10 @@ def run_machine(
     start_at: float,
     until: threading.Event,
     skew: float = 0.0,
+    beside: Callable[[], Any] | None = None,
 ) -> None:
-    """The real-time loop on an open session; returns when `until` is set."""
+    """The real-time loop on an open session; returns when `until` is set. beside: opens another
+    session, on which the machine's camera hears of other machines."""
     # The computer's clock is read once: later corrections of it must not make time jump here.
     epoch = time.time() - time.monotonic()
     prefix = site.machine(name).prefix
@@ -111,9 +120,11 @@ def run_machine(
     # Milliseconds since the epoch: a machine that is started again never issues a token twice.
     first = no_lease(int(1e3 * time.time()))
     ear = Ear(session, prefix, first, on_schedule_time, lambda: wire.cut)
+    camera = CabCamera(session, site, name, machine, lambda: wire.now, lambda: wire.cut, beside)
     try:
         _loop(site, name, machine, program, rig, wire, ear, epoch, start_at, until, skew)
     finally:
+        camera.close()
         ear.close()
         for declared in (answering, *wire.outlets.values()):
             declared.undeclare()
@@ -157,6 +168,10 @@ def _loop(
             t += dt
             agent, state, demand = act(agent, program, hydraulics, state, t - start_at, dt)
             state = step(state, demand, limits, hydraulics, dt)
+            if t >= truth_due - 1e-6:  # no radio: partners' cameras go on seeing the machine
+                truth = _truth(machine, site, name, state, t + skew)
+                wire.outlets["truth"].put(encode_truth(truth))
+                truth_due += TRUTH_PERIOD
             if is_cut(program, t - start_at):
                 wire.on_air = ()
                 due = [max(d, t) for d in due]
@@ -171,10 +186,7 @@ def _loop(
                 status = encode_status(report)
                 wire.on_air = send(wire.on_air, t, ("status", status), wire.radio)
                 status_due += STATUS_PERIOD
-            if t >= truth_due - 1e-6:
-                truth = _truth(machine, site, name, state, t + skew)
-                wire.outlets["truth"].put(encode_truth(truth))
-                truth_due += TRUTH_PERIOD
+        wire.now = state, t + skew
         arrived, wire.on_air = receive(wire.on_air, now)
         for outlet, payload in arrived:
             wire.outlets[outlet].put(payload)

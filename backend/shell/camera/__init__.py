@@ -1,0 +1,1 @@
+"""Cameras of the machines: pictures fetched once for all who watch, with an honest age."""

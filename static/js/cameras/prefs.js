@@ -1,0 +1,37 @@
+// What each operator chose of pictures and machines, kept in this browser.
+
+import { state } from "../state.js";
+
+const START = { shown: true, machines: "two", large: "", picks: {} };
+const key = () => `cameras ${state.you?.who ?? ""}`;
+
+let who = null;
+export let prefs = { ...START };
+
+/** Once it is known who sits here: what they left. True when it is another than before. */
+export function recall() {
+  if (state.you?.who === who) return false;
+  who = state.you?.who;
+  let kept = null;
+  try {
+    kept = JSON.parse(localStorage.getItem(key()));
+  } catch {
+    // this browser keeps nothing, or not what was put there
+  }
+  prefs = { ...START };
+  if (kept && typeof kept === "object") {
+    if (typeof kept.shown === "boolean") prefs.shown = kept.shown;
+    if (kept.machines === "one") prefs.machines = "one";
+    if (kept.picks && typeof kept.picks === "object") prefs.picks = { ...kept.picks };
+  }
+  return true;
+}
+
+export function change(changes) {
+  prefs = { ...prefs, ...changes };
+  try {
+    localStorage.setItem(key(), JSON.stringify({ ...prefs, large: "" }));
+  } catch {
+    // this browser keeps nothing
+  }
+}
