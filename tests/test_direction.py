@@ -24,6 +24,10 @@ ROOMS: dict[str, set[str]] = {
         "backend.fusion",
     },
     "backend.safety": {"backend.collision", "backend.machine", "backend.spatial"},
+    "backend.planning": {
+        *("backend.safety", "backend.collision", "backend.machine", "backend.spatial"),
+        "backend.errors",
+    },
     "backend.control": {
         *("backend.safety", "backend.machine", "backend.spatial", "backend.errors"),
     },
@@ -62,7 +66,7 @@ LIBRARIES: dict[str, str | tuple[str, ...]] = {
 }
 
 IMPURE = {"time", "random", "threading", "logging", "asyncio", "socket", "subprocess", "requests"}
-PURE = {"spatial", "collision", "control", "cspace", "fusion", "safety", "pipeline"}
+PURE = {"spatial", "collision", "control", "cspace", "fusion", "safety", "planning", "pipeline"}
 
 
 def module_name(path: Path) -> str:
