@@ -119,7 +119,7 @@ def _repelled(
         settings.damping,
         settings.projector,
     )
-    rates = np.clip(_slowed(wanted + away, machine.max_velocity), low, high)
+    rates = np.clip(wanted + away, low, high)
     pushing = points[near.distance[points] < settings.thresholds.upper]
     return Action(rates, 1.0, _why(machine, near, pushing))
 
