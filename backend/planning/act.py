@@ -46,11 +46,18 @@ def act(
     )
 
 
-def sight(machine: Machine, T_site_links: Array, method: Method, settings: Settings) -> Sight:
-    """How near pairs must be to be told to `act`: p_u; for C from where full speed is damped.
+def sight(
+    machine: Machine,
+    T_site_links: Array,
+    method: Method,
+    settings: Settings,
+    state: State,
+    dt: float,
+) -> Sight:
+    """How near pairs must be to be told to `act`: p_u; for C all that could be damped.
 
-    No distance shrinks faster than the joints' full speeds times the levers of the bodies' farthest
-    points. T_site_links: (L, 4, 4).
+    No distance shrinks faster than the joints' speeds, the highest that they can have after dt,
+    times the levers of the bodies' farthest points. T_site_links: (L, 4, 4).
     """
     if method != "constrained":
         return Sight.everywhere(machine, settings.thresholds.upper)
@@ -61,7 +68,10 @@ def sight(machine: Machine, T_site_links: Array, method: Method, settings: Setti
     r = boxes.centers[:, None] - T[None, :, :3, 3]
     along = np.einsum("bjx,jx->bj", r, z)
     lever = np.sqrt(np.maximum((r**2).sum(axis=2) - along**2, 0.0)) + radius[:, None]
-    speed = lever * machine.body_joints * machine.max_velocity
+    fastest = machine.max_velocity
+    if settings.accelerations:
+        fastest = np.minimum(fastest, np.abs(state.rates) + machine.max_acceleration * dt)
+    speed = lever * machine.body_joints * fastest
     pairs = machine.self_pair_index
     own = (speed[pairs[:, 1]] * machine.self_pair_joints).sum(axis=1)
     scale, keep = 1.0 / _rate(machine, settings), settings.thresholds.lower

@@ -125,8 +125,9 @@ def near_points(
 ) -> Proximities:
     """Pairs in sight of the machine's bodies and the limits, and of its own bodies.
 
-    One pair per two boxes, their closest points; with `corners` also each corner that is near the
-    other box, so that what is nearest does not jump where faces are almost parallel.
+    One pair per two boxes, their closest points; with `corners` and boxes nearer than 1.5 m also
+    each corner that is near the other box, so that what is nearest does not jump where faces are
+    almost parallel.
     T_site_links: (L, 4, 4). Bodies that no joint moves are not judged against limits.
     """
     mine = body_boxes(machine, T_site_links)

@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from backend.collision.box_kernels import pair_distance
+from backend.collision.box_kernels import pair_distance, separation
 from backend.spatial.types import Array, BoolArray, IntArray
 
 _TOUCHING = 1e-9  # [m] up to which the closest points give no direction
+_NEAR = 1.5  # [m] between boxes from which corners say no more than closest points do
 _OUTSIDE = 1e-6  # [m] from which a corner does
 
 
@@ -70,7 +71,7 @@ def find(
         else:
             _way_out(ca[i], Ra[i], ha[i], cb[j], Rb[j], hb[j], normals[r])
         r += 1
-        if corners:
+        if corners and d < _NEAR:
             for side in range(2):
                 c, R, h = (ca[i], Ra[i], ha[i]) if side == 0 else (cb[j], Rb[j], hb[j])
                 c2, R2, h2 = (cb[j], Rb[j], hb[j]) if side == 0 else (ca[i], Ra[i], ha[i])
@@ -92,6 +93,20 @@ def find(
                     normals[r] = (on_a[r] - on_b[r]) / d
                     r += 1
     return who[:r], on_a[:r], on_b[:r], distances[:r], normals[:r]
+
+
+@njit(cache=True, nogil=True)
+def shortest(
+    ca: Array, Ra: Array, ha: Array, cb: Array, Rb: Array, hb: Array, index: IntArray, cap: float
+) -> float:
+    """The shortest distance among a[index[k, 0]], b[index[k, 1]] [m], cap where none is."""
+    best = cap
+    points = np.empty((2, 3))
+    for i, j in index:
+        # Nearer than the gap along a separating axis no two boxes are.
+        if separation(ca[i], Ra[i], ha[i], cb[j], Rb[j], hb[j]) < best:
+            best = min(best, pair_distance(ca[i], Ra[i], ha[i], cb[j], Rb[j], hb[j], points))
+    return best
 
 
 @njit(cache=True, nogil=True)

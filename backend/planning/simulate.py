@@ -7,17 +7,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from backend.collision import box_distance
-from backend.machine.kinematics import link_poses
+from backend.machine.kinematics import body_boxes
 from backend.machine.model import Machine
 from backend.machine.pose import pose_error, tool_pose
+from backend.planning import proximity_kernels
 from backend.planning.act import act, sight, task_rates
 from backend.planning.cushion import rate_bounds
 from backend.planning.proximity import Limits, near_points, posed
 from backend.planning.records import Action, Method, Settings, State, Wish
 from backend.planning.stopping import stoppable
 from backend.planning.task_path import JointPath, follow
-from backend.spatial.boxes import Boxes
 from backend.spatial.types import Array
 
 STEP = 0.02
@@ -26,6 +25,7 @@ STEP = 0.02
 _STIFFNESS = 2.0  # [1/s]
 _MAKE_UP = (0.6, 0.8)  # [m/s], [rad/s] by which a path is caught up with
 _THERE = (0.03, 0.03)  # [m], [rad] from the last goal that count as arrived
+_JUDGED = 1.0  # [m] beyond which a stop's clearance does not matter
 _FAR = 1e3  # [m] told where nothing is near
 
 
@@ -104,7 +104,7 @@ def run(
     why: list[tuple[str, ...]] = []
 
     def clearance(postures: Array) -> Array:
-        return clearances(machine, limits, postures, T_site_root)
+        return clearances(machine, limits, postures, T_site_root, cap=_JUDGED)
 
     for i in range(count):
         asked = wish(float(times[i]), q)
@@ -114,15 +114,15 @@ def run(
             wanted = task_rates(machine, T, asked, settings.damping)
             action = Action(np.clip(wanted, low, high), 1.0, ())
         else:
+            state = State(rates, T_site_root)
             near = near_points(
                 machine,
                 T,
                 limits,
-                sight(machine, T, method, settings),
+                sight(machine, T, method, settings, state, dt),
                 corners=method != "potential",
             )
             distance[i] = float(near.distance.min(initial=_FAR))
-            state = State(rates, T_site_root)
             action = act(method, machine, q, asked, near, state, dt, settings)
         moved = action.rates
         if guarded and method is not None:
@@ -137,34 +137,27 @@ def run(
 
 
 def clearances(
-    machine: Machine, limits: Limits, q: Array, T_site_root: Array | None = None
+    machine: Machine,
+    limits: Limits,
+    q: Array,
+    T_site_root: Array | None = None,
+    cap: float = np.inf,
 ) -> Array:
     """(m,) shortest distance of the machine's moving bodies to limits and own bodies in postures
-    q (m, n) [m], negative on overlap.
+    q (m, n) [m], negative on overlap, `cap` where it is longer.
     """
-    T = link_poses(machine, q, T_site_root)[:, machine.body_link_index]
-    m, bodies = T.shape[:2]
-    R = T[..., :3, :3]
-    centers = (R @ machine.bodies.centers[..., None])[..., 0] + T[..., :3, 3]
-    every = Boxes(
-        centers.reshape(-1, 3),
-        (R @ machine.bodies.rotations).reshape(-1, 3, 3),
-        np.tile(machine.bodies.half_extents, (m, 1)),
-    )
-    moving = np.flatnonzero(machine.body_joints.any(axis=1))
     count = len(limits.boxes)
-    instant = np.arange(m)[:, None, None] * bodies
-    found = np.full(m, np.inf)
-    if count:
-        i = (instant + moving[None, :, None] + np.zeros((1, 1, count), np.int64)).ravel()
-        j = np.broadcast_to(np.arange(count), (m, len(moving), count)).ravel()
-        d, _ = box_distance.pair_distances(every, limits.boxes, i, j)
-        found = d.reshape(m, -1).min(axis=1)
-    if len(machine.self_pair_index):
-        pairs = machine.self_pair_index[None] + np.arange(m)[:, None, None] * bodies
-        a, b = pairs[..., 0].ravel(), pairs[..., 1].ravel()
-        d, _ = box_distance.pair_distances(every, every, a, b)
-        found = np.minimum(found, d.reshape(m, -1).min(axis=1))
+    moving = np.flatnonzero(machine.body_joints.any(axis=1))
+    outer = np.stack([np.repeat(moving, count), np.tile(np.arange(count), len(moving))], axis=1)
+    found = np.empty(len(q))
+    b = limits.boxes
+    for k, posture in enumerate(q):
+        a = body_boxes(machine, posed(machine, posture, T_site_root))
+        mine = (a.centers, a.rotations, a.half_extents)
+        own = proximity_kernels.shortest(*mine, *mine, machine.self_pair_index, cap)
+        found[k] = proximity_kernels.shortest(
+            *mine, b.centers, b.rotations, b.half_extents, outer, own
+        )
     return found
 
 
