@@ -38,7 +38,7 @@ def careless_drive(machine: Machine, seed: int, seconds: float) -> CarelessDrive
     while True:
         around, far = random.uniform(-np.pi, np.pi, count), random.uniform(2.5, 6.0, count)
         half = random.uniform((0.15, 0.15, 0.3), (1.5, 1.5, 2.5), (count, 3))
-        far += half[:, :2].max(axis=1)
+        far += np.linalg.norm(half[:, :2], axis=1)  # beyond the the chassis
         height = random.uniform(-0.5, 4.5, count)
         centers = np.stack([far * np.cos(around), far * np.sin(around), height], axis=1)
         boxes = Boxes(centers, rz(random.uniform(0.0, np.pi, count)), half)

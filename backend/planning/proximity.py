@@ -132,8 +132,8 @@ def near_points(
     """
     mine = body_boxes(machine, T_site_links)
     bound = box_distance.lower_bounds(mine, limits.boxes)
-    moving = machine.body_joints.any(axis=1)[:, None]
-    index = np.stack(np.nonzero((bound < sight.limits[:, None]) & moving), axis=1)
+    moving = np.asarray(machine.body_joints.any(axis=1))
+    index = np.stack(np.nonzero((bound < sight.limits[:, None]) & moving[:, None]), axis=1)
     outer = _found(mine, limits.boxes, index, sight.limits[index[:, 0]], corners)
     none = np.full(len(outer[3]), -1, dtype=np.int64)
     parts = [(outer[0][:, 0], outer[0][:, 1], none, *outer[1:])]
@@ -163,10 +163,11 @@ def closest_per_group(near: Proximities, group: IntArray) -> IntArray:
 def _found(
     a: Boxes, b: Boxes, index: IntArray, within: Array, corners: bool
 ) -> tuple[IntArray, Array, Array, Array, Array]:
-    return proximity_kernels.find(
+    who, on_a, on_b, distances, normals = proximity_kernels.find(
         *(a.centers, a.rotations, a.half_extents),
         *(b.centers, b.rotations, b.half_extents),
         np.ascontiguousarray(index),
         within,
         corners,
     )
+    return who, on_a, on_b, distances, normals

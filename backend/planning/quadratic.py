@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from backend.planning import quadratic_kernel
-from backend.spatial.types import Array
+from backend.spatial.types import Array, BoolArray
 
 
 class Minimum(NamedTuple):
@@ -37,7 +37,9 @@ def minimise(H: Array, g: Array, A: Array, b: Array) -> Minimum:
     return Minimum(x, u / length, bool(ok))
 
 
-def minimise_softly(H: Array, g: Array, A: Array, b: Array, soft: Array, price: float) -> Minimum:
+def minimise_softly(
+    H: Array, g: Array, A: Array, b: Array, soft: BoolArray, price: float
+) -> Minimum:
     """The same where the rows `soft` (m,) may all miss by one amount s, at price * s^2 / 2.
 
     Feasible when the other rows are. x: (n,).

@@ -99,7 +99,8 @@ def run(
     """
     n, count = len(machine.joints), round(seconds / dt)
     q, rates = np.array(q_start, dtype=float), np.zeros(n)
-    times, all_q, all_rates = np.arange(count) * dt, np.empty((count, n)), np.empty((count, n))
+    times: Array = np.arange(count, dtype=float) * dt
+    all_q, all_rates = np.empty((count, n)), np.empty((count, n))
     distance, scale, braked = np.full(count, _FAR), np.ones(count), np.zeros(count)
     why: list[tuple[str, ...]] = []
 
