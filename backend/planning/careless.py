@@ -43,10 +43,9 @@ def careless_drive(machine: Machine, seed: int, seconds: float) -> CarelessDrive
         centers = np.stack([far * np.cos(around), far * np.sin(around), height], axis=1)
         boxes = Boxes(centers, rz(random.uniform(0.0, np.pi, count)), half)
         limits = Limits(tuple(f"limit {k + 1}" for k in range(count)), boxes)
-        postures = random.uniform(low, high, (_TRIES, len(low)))
-        clear = np.flatnonzero(clearances(machine, limits, postures) > _CLEAR)
-        if len(clear):
-            return CarelessDrive(limits, postures[clear[0]], _sticks(machine, random, seconds))
+        for posture in random.uniform(low, high, (_TRIES, len(low))):
+            if clearances(machine, limits, posture[None], cap=_CLEAR)[0] >= _CLEAR:
+                return CarelessDrive(limits, posture, _sticks(machine, random, seconds))
 
 
 def _sticks(

@@ -28,8 +28,8 @@ BELOW, BESIDE = 1.0, 3.0  # of the 25 kV line, Section 2.1.2 [m]
 TRACKS_APART, ENVELOPE_HEIGHT, ENVELOPE_DEPTH = 4.5, 4.7, 1.0  # assumed [m]
 WIRE_HEIGHT, LENGTH = 6.15, 40.0  # assumed [m]
 
-POLE_START_DEG = (12.0, 25.0, -95.0, -25.0, 0.0, 0.0)
-POLE_SPEED, POLE_GO, POLE_BACK = 0.5, 1.0, 5.0  # [m/s]; when it goes and turns back [s], Fig. 4.3
+POLE_START_DEG = (15.0, 25.0, -88.0, -28.0, 0.0, 0.0)
+POLE_SPEED, POLE_GO, POLE_BACK = 0.6, 1.0, 5.0  # [m/s]; when it goes and turns back [s], Fig. 4.3
 
 BALLAST_DEG = (
     (-10.0, 30.0, -85.0, -35.0, 0.0, 0.0),  # Fig. 4.5: initial pose
