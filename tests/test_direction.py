@@ -33,6 +33,10 @@ ROOMS: dict[str, set[str]] = {
     "backend.gauge": {
         *("backend.collision", "backend.machine", "backend.spatial", "backend.errors"),
     },
+    "backend.planning": {
+        *("backend.safety", "backend.collision", "backend.machine", "backend.spatial"),
+        "backend.errors",
+    },
     "backend.control": {
         *("backend.safety", "backend.machine", "backend.spatial", "backend.errors"),
     },
@@ -74,7 +78,10 @@ LIBRARIES: dict[str, str | tuple[str, ...]] = {
 }
 
 IMPURE = {"time", "random", "threading", "logging", "asyncio", "socket", "subprocess", "requests"}
-PURE = {"spatial", "collision", "control", "cspace", "fusion", "gauge", "safety", "pipeline"}
+PURE = {
+    *("spatial", "collision", "control", "cspace", "fusion", "gauge", "safety", "planning"),
+    "pipeline",
+}
 
 
 def module_name(path: Path) -> str:
