@@ -164,6 +164,10 @@ def test_bodies_are_named_and_idle_volumes_left_out(site_file: Path) -> None:
     assert named == {volume.name for volume in bodies.volumes} - {"T2", "P2"}
     k = bodies.names.index("gauge:P1/0")
     np.testing.assert_allclose(bodies.boxes.centers[k], [0.0, 17.0, 4.0])
+    less = bodies.without(["T1", "nobody"])
+    assert set(bodies.names) - set(less.names) == {"gauge:T1/0"}
+    assert len(less.boxes) == len(less.names)
+    assert bodies.without(["T2"]) is bodies
     assert bodies.standing.names == ("wall",)
     assert len(bodies.standing.boxes) == 1
 
