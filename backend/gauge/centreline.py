@@ -59,13 +59,41 @@ class Centreline(Protocol):
 
 @dataclass(frozen=True)
 class PointStations:
-    """`Stations` as plain arrays."""
+    """`Stations` as plain arrays. lift: (k,) how far cant raises the midpoint between the rails
+    above xyz [m], where that is known.
+    """
 
     xyz: Array
     heading: Array
     gradient: Array
     cant: Array
     curvature: Array
+    lift: Array | None = None
+
+
+class InFrame:
+    """A centreline in another frame with parallel axes, such as the site's, and with a height where
+    it has none.
+    """
+
+    def __init__(self, line: Centreline, origin: Array, height: float | None = None) -> None:
+        """origin: (3,) of the frame, in the line's [m]; height: in the frame [m], of stations whose
+        own is not finite.
+        """
+        self.name, self.state, self.gauge = line.name, line.state, line.gauge
+        self.length = line.length
+        self._line, self._origin, self._height = line, np.asarray(origin), height
+
+    def at(self, s: Array) -> PointStations:
+        """The stations s (k,) [m]."""
+        at = self._line.at(s)
+        xyz, gradient = at.xyz - self._origin, at.gradient
+        if self._height is not None:
+            unknown = ~np.isfinite(xyz[:, 2])
+            xyz[:, 2] = np.where(unknown, self._height, xyz[:, 2])
+            gradient = np.where(unknown, 0.0, gradient)
+        lift = getattr(at, "lift", None)
+        return PointStations(xyz, at.heading, gradient, at.cant, at.curvature, lift)
 
 
 class LineThroughPoints:

@@ -141,7 +141,7 @@ def cover(shape: BaseGeometry, max_excess: float, most: int) -> list[Rectangle]:
             covers: list[list[Rectangle]] = [
                 [r for part in way for r in rectangles(part, max_excess, most)] for way in ways
             ]
-            found += min(covers, key=len)
+            found += covers[int(np.argmin([len(rectangles) for rectangles in covers]))]
     return found
 
 

@@ -33,7 +33,7 @@ class TrackRule:
     top: float = 5.3
     profile: Array | None = None
     widening: float = 0.0
-    pivot: Pivot | None = "low_rail"
+    pivot: Pivot | None = "as_told"
     rail_head: float = 0.072
 
 

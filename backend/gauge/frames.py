@@ -10,9 +10,10 @@ import numpy as np
 from backend.gauge.centreline import Centreline
 from backend.spatial.types import Array
 
-Pivot: TypeAlias = Literal["low_rail", "centre"]
+Pivot: TypeAlias = Literal["as_told", "low_rail", "centre"]
 """What cant turns a cross-section about: the lower rail's top (the upper rail is lifted by all of
-the cant) or the midpoint between the rails (by half of it)."""
+the cant), the midpoint between the rails (by half of it), or what the centreline tells by its
+stations' `lift` (k,) [m], how far cant raises the midpoint; the lower rail where it has none."""
 
 
 @dataclass(frozen=True)
@@ -53,9 +54,12 @@ def track_frames(line: Centreline, s: Array, pivot: Pivot | None, spacing: float
     sine = np.clip(at.cant / spacing, -1.0, 1.0)[:, None]
     cosine = np.sqrt(1.0 - sine**2)
     tilted = cosine * left + sine * up
-    origin = at.xyz
-    if pivot == "low_rail":
-        # The left rail is the higher one for positive cant: the right one stays.
-        to_low = -np.sign(sine) * spacing / 2.0
-        origin = origin + to_low * (left - tilted)
+    # The left rail is the higher one for positive cant: the right one stays.
+    y = -np.sign(sine) * spacing / 2.0
+    lift = getattr(at, "lift", None)
+    if pivot == "as_told" and lift is not None:
+        y = -np.divide(lift[:, None], sine, out=np.zeros_like(sine), where=np.abs(sine) > 1e-9)
+    if pivot == "centre":
+        y = np.zeros_like(sine)
+    origin = at.xyz + y * (left - tilted)
     return TrackFrames(origin, tangent, tilted, cosine * up - sine * left, at.curvature)

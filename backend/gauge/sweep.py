@@ -42,7 +42,7 @@ class Sweep:
     section: Section
     tolerance: float
     widening: float = 0.0
-    pivot: Pivot | None = "low_rail"
+    pivot: Pivot | None = "as_told"
     spacing: float = 1.5
     square: bool = False
 
@@ -120,6 +120,11 @@ def _fitted(sweep: Sweep, start: float, end: float) -> Piece:
     frames = sweep.frames(s)
     polygons = sweep.polygons(frames)
     _check_width(sweep, frames, polygons, s)
+    if not np.isfinite(frames.origin).all():
+        raise InputError(
+            f"{sweep.line.name}: the line's place or height is not known everywhere between "
+            f"{start:.2f} and {end:.2f} m; allowed is a line that is."
+        )
     R = _axes(frames)
     origin = frames.origin[count // 2]
     local = (frames.place(polygons) - origin) @ R

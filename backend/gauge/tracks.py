@@ -74,19 +74,37 @@ def sections_of(rule: TrackRule, line: Centreline) -> tuple[Section, ...]:
 
 def stretches(line: Centreline, center: Array, radius: float) -> list[tuple[float, float]]:
     """From where to where [m] the line is within `radius` of `center` (2,), a little more at both
-    ends.
+    ends, and its place in plan is known (finite).
     """
     count = max(1, math.ceil(line.length / STEP))
     s = np.linspace(0.0, line.length, count + 1)
-    inside = np.linalg.norm(line.at(s).xyz[:, :2] - center, axis=1) <= radius + STEP
+    xy = line.at(s).xyz[:, :2]
+    known = np.asarray(np.isfinite(xy).all(axis=1))
+    apart = np.full(len(s), np.inf)
+    apart[known] = np.linalg.norm(xy[known] - center, axis=1)
+    # Whatever is within the radius between two of the places is within a step more of both.
+    inside = apart <= radius + STEP
     edges = np.diff(np.concatenate([[0], inside.astype(int), [0]]))
-    found: list[tuple[float, float]] = []
+    found = []
     for first, last in zip(np.flatnonzero(edges > 0), np.flatnonzero(edges < 0) - 1, strict=True):
-        low, high = float(s[max(int(first) - 1, 0)]), float(s[min(int(last) + 1, count)])
-        if found and found[-1][1] >= low:
-            low = found.pop()[0]
+        low, high = float(s[first]), float(s[last])
+        if first > 0 and not known[first - 1]:
+            low = _edge(line, low, float(s[first - 1]))
+        if last < count and not known[last + 1]:
+            high = _edge(line, high, float(s[last + 1]))
         found.append((low, high))
-    return found
+    return [(low, high) for low, high in found if high > low]
+
+
+def _edge(line: Centreline, known: float, unknown: float) -> float:
+    """The last station whose place is known, to a millimetre [m]."""
+    while abs(unknown - known) > 1e-3:
+        middle = (known + unknown) / 2.0
+        if np.isfinite(line.at(np.array([middle])).xyz[:, :2]).all():
+            known = middle
+        else:
+            unknown = middle
+    return known
 
 
 def words(rule: TrackRule) -> str:

@@ -138,9 +138,8 @@ def _beams(
     if more[1] * slope > tolerance:
         beams.append((end, last, 0.0))
         last = end
-    beams.append(
-        (first, last, slope * max(np.linalg.norm(first - start), np.linalg.norm(last - end)))
-    )
+    over = max(float(np.linalg.norm(first - start)), float(np.linalg.norm(last - end)))
+    beams.append((first, last, slope * over))
     left = np.array([-ahead[1], ahead[0], 0.0]) * rule.beside
     found = []
     for a, b, slack in beams:

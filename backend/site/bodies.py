@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -50,6 +50,19 @@ class SiteBodies:
     def full_names(self) -> tuple[str, ...]:
         """ "site:wall", "site:hall/0", "gauge:T1/0"."""
         return tuple(name if _of_gauge(name) else f"site:{name}" for name in self.names)
+
+    def without(self, names: Collection[str]) -> SiteBodies:
+        """Without the boxes of these limit volumes, such as of the track that a machine stands on;
+        itself when it has none of them.
+        """
+        dropped = {
+            box for volume in self.volumes if volume.name in names for box in volume.box_names
+        }
+        kept = np.array([name not in dropped for name in self.names], dtype=bool)
+        if kept.all():
+            return self
+        names_kept = tuple(name for name in self.names if name not in dropped)
+        return SiteBodies(self.boxes.take(kept), names_kept, self.volumes, self.idle)
 
     @cached_property
     def standing(self) -> SiteBodies:

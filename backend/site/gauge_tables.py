@@ -28,7 +28,7 @@ class TrackEnvelope(Table):
     bottom: float | None = None
     top: float | None = None
     widening: NotNegative | None = None
-    pivot: Literal["low_rail", "centre", "none"] | None = None
+    pivot: Literal["as_told", "low_rail", "centre", "none"] | None = None
     rail_head: Positive | None = None
 
     @model_validator(mode="after")
@@ -184,9 +184,11 @@ class Gauge(Table):
     @property
     def names(self) -> Iterator[str]:
         """Of all features of the tables."""
-        lines = (*self.track, *self.overhead, *self.buried)
+        yield from (track.name for track in self.track)
+        yield from (wire.name for wire in self.overhead)
         areas = (*self.building, *self.road, *self.keep_out, *self.keep_in)
-        yield from (feature.name for feature in (*lines, *self.pole, *areas))
+        others: tuple[_Feature, ...] = (*self.pole, *areas, *self.buried)
+        yield from (feature.name for feature in others)
         if self.ceiling is not None:
             yield self.ceiling.name
 

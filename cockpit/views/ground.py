@@ -1,4 +1,4 @@
-"""What does not move: light, ground plane, UTM grid, north arrow, obstacles."""
+"""What does not move: light, ground plane, UTM grid, north arrow, obstacles, working gauge."""
 
 from __future__ import annotations
 
@@ -67,6 +67,7 @@ class Ground:
         arrow += np.float32([center[0] + reach[0], center[1] + 0.75 * reach[1], 0.0])
         _lines(scene, "/ground/north", arrow, palette.SECONDARY, 2.2)
         self._obstacles(scene, site)
+        self._gauge(scene, site)
 
     def _obstacles(self, scene: viser.SceneApi, site: SceneSite) -> None:
         if not len(site.obstacles):
@@ -83,6 +84,23 @@ class Ground:
             receive_shadow=False,
         )
         _lines(scene, "/obstacles/edges", feature_edges(vertices, faces), palette.SITE, 1.4)
+
+    def _gauge(self, scene: viser.SceneApi, site: SceneSite) -> None:
+        """Nothing that can be seen is there: fainter than obstacles."""
+        if not len(site.gauge):
+            return
+        vertices, faces = box_mesh(site.gauge)
+        scene.add_mesh_simple(
+            "/gauge",
+            vertices,
+            faces,
+            color=palette.SITE,
+            opacity=0.16,
+            flat_shading=True,
+            cast_shadow=False,
+            receive_shadow=False,
+        )
+        _lines(scene, "/gauge/edges", feature_edges(vertices, faces), palette.SITE, 1.0)
 
     @property
     def height(self) -> float:

@@ -11,9 +11,9 @@ from shapely.geometry.base import BaseGeometry
 
 from backend.machine.model import Machine
 from backend.pipeline.records import Snapshot
-from backend.site.bodies import site_bodies
+from backend.site.bodies import SiteBodies, site_bodies
 from backend.site.site import Site
-from backend.spatial.boxes import Boxes
+from backend.spatial.boxes import NO_BOXES, Boxes, concatenated
 from backend.spatial.types import Array
 from cockpit.views.shapes import LinkLooks, link_looks
 
@@ -46,7 +46,7 @@ class SceneSite:
     """A site as it is drawn.
 
     origin: easting, northing, height of the site frame's origin in the projected CRS [m];
-    machines: in the order of the site; obstacles: in the site frame;
+    machines: in the order of the site; obstacles, gauge: in the site frame;
     slow_below, stop_below: limits of the distance [m].
     """
 
@@ -56,6 +56,7 @@ class SceneSite:
     obstacles: Boxes
     slow_below: float
     stop_below: float
+    gauge: Boxes = NO_BOXES
 
     def __post_init__(self) -> None:
         if not self.machines:
@@ -66,15 +67,23 @@ class SceneSite:
 
 def scene_site(site: Site, models: Mapping[str, Machine]) -> SceneSite:
     """What the scene needs of a loaded site; models: one per machine's name."""
+    bodies = site_bodies(site)
     easting, northing, height = (float(value) for value in site.frame.origin)
     return SceneSite(
         title=site.title,
         origin=(easting, northing, height),
         machines={m.name: SceneMachine(m.label, models[m.name]) for m in site.machines},
-        obstacles=site_bodies(site).standing.boxes,
+        obstacles=bodies.standing.boxes,
         slow_below=site.safety.slow_below,
         stop_below=site.safety.stop_below,
+        gauge=_drawn_gauge(bodies),
     )
+
+
+def _drawn_gauge(bodies: SiteBodies) -> Boxes:
+    """Without what lies all around: ceilings and the outside of keep-in areas."""
+    shown = [v for v in bodies.volumes if v.kind not in ("ceiling", "keep_in")]
+    return concatenated(v.boxes for v in shown if v.name not in bodies.idle)
 
 
 class ZoneImage(Protocol):

@@ -32,7 +32,7 @@ class Envelope:
         roll = np.arcsin(at.cant[0] / spacing) if self.rule.pivot else 0.0
         tilted = from_attitude(at.heading[0], pitch, roll)
         pivot = np.zeros(3)
-        if self.rule.pivot == "low_rail":
+        if self.rule.pivot in ("low_rail", "as_told"):
             pivot[1] = -np.sign(at.cant[0]) * spacing / 2.0
         return at.xyz[0] + level @ pivot - tilted @ pivot, tilted
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from shapely.geometry import Polygon
 from track_curves import Curve, circle, clothoid, constant, straight
 
 from backend.errors import InputError
+from backend.gauge.centreline import Centreline, InFrame, PointStations
 from backend.gauge.features import Track, TrackRule
 from backend.gauge.tracks import stretches, track_volume
 from backend.gauge.volumes import LimitVolume
@@ -79,7 +81,18 @@ RULES = {
 }
 
 
-def volume_of(line: Curve, rule: TrackRule, tolerance: float = TOLERANCE) -> LimitVolume:
+class Lifted(InFrame):
+    """A line that tells how far cant lifts its middle."""
+
+    def __init__(self, line: Centreline, lift: float) -> None:
+        super().__init__(line, np.zeros(3))
+        self.lift = lift
+
+    def at(self, s: Array) -> PointStations:
+        return replace(super().at(s), lift=np.full(len(s), self.lift))
+
+
+def volume_of(line: Centreline, rule: TrackRule, tolerance: float = TOLERANCE) -> LimitVolume:
     return track_volume(Track(line), rule, tolerance, HERE, 1e6)
 
 
@@ -210,6 +223,12 @@ def test_cant_lifts_the_left_rail_about_the_right_one() -> None:
     z = volume_of(line, middle).boxes.corners()[0][:, 2]
     assert z.min() == pytest.approx(-0.075, abs=1e-5)
     assert z.max() == pytest.approx(0.075 + 1e-3, abs=1e-5)
+    told = InFrame(line, np.zeros(3))
+    for lift, low_z in ((0.075, 0.0), (0.0, -0.075), (-0.075, -0.15)):
+        turned = Lifted(told, lift)
+        assert volume_of(turned, low).boxes.corners()[0][:, 2].min() == pytest.approx(
+            low_z, abs=1e-4
+        )
     upright = TrackRule(half_width=0.75, bottom=0.0, top=1e-3, pivot=None)
     assert volume_of(line, upright).boxes.half_extents[0, 2] == pytest.approx(5e-4, abs=1e-6)
 
@@ -241,6 +260,31 @@ def test_only_the_part_that_matters_is_kept() -> None:
     assert len(ends) == 2
     assert ends[0][0] == 0.0
     assert ends[1][1] == pytest.approx(ring.length)
+
+
+def test_a_stretch_that_is_not_known_is_a_gap_and_no_height_is_refused() -> None:
+    def plan(s: Array) -> tuple[Array, Array, Array, Array]:
+        nothing = np.zeros(len(s))
+        return np.where((s > 31.234) & (s < 47.891), np.nan, s), nothing, nothing, nothing
+
+    line = Curve("gap", 90.0, plan)
+    assert np.abs(np.array(stretches(line, HERE, 1e3)) - [[0, 31.234], [47.891, 90]]).max() < 2e-3
+    assert len(volume_of(line, TrackRule()).boxes) == 2
+    flat = Curve("flat", 50.0, straight(), lambda s: np.full(len(s), np.nan))
+    with pytest.raises(InputError, match=r"flat: .* height is not known everywhere .*\.$"):
+        volume_of(flat, TrackRule())
+    known = track_volume(Track(InFrame(flat, np.zeros(3), 2.0)), TrackRule(), TOLERANCE, HERE, 1e3)
+    assert known.boxes.corners()[0, :, 2].min() == pytest.approx(2.0, abs=1e-6)
+
+
+def test_lines_of_another_frame() -> None:
+    line = CURVES[-1]
+    moved = InFrame(line, np.array([-3.0, 4.0, 1.0]))
+    there = track_volume(Track(moved), TrackRule(), TOLERANCE, HERE, 1e3)
+    here = volume_of(line, TrackRule())
+    np.testing.assert_allclose(
+        there.boxes.centers, here.boxes.centers + np.array([3.0, -4.0, -1.0])
+    )
 
 
 def two_straights(turn: float) -> Curve:

@@ -139,6 +139,15 @@ def test_obstacles_are_drawn(server: viser.ViserServer) -> None:
     )
 
 
+def test_the_working_gauge_is_drawn_fainter(server: viser.ViserServer) -> None:
+    track = Boxes(np.array([[0, 8, 2.0]]), np.eye(3)[None], np.array([[20, 1.8, 2.0]]))
+    site = dataclasses.replace(toy.site(obstacles=track), gauge=track)
+    Scene(server.scene, site).update(toy.snapshot(), 0.0)
+    corners = track.corners()[0].astype(np.float32)
+    np.testing.assert_allclose(handle(server, "/gauge").vertices, corners)
+    assert handle(server, "/gauge").opacity < handle(server, "/obstacles").opacity
+
+
 def test_zones_are_drawn_only_when_new_and_greyed_when_old(server: viser.ViserServer) -> None:
     source = toy.Source()
     own = OwnNodes(server.scene, "left", 1.0)

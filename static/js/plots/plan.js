@@ -10,7 +10,7 @@ import { image, imageAge, imageStale, label as nameOf, machine, names, pair, rep
 import { shownZone } from "../view.js";
 import { surface } from "../surface.js";
 import {
-  base, chart, circles, drawZone, exitArrow, gridLines, gridText, iso, nearestLine, north, obstacles, outlines, wedge, zonePoints,
+  base, chart, circles, drawZone, exitArrow, gauge, gridLines, gridText, iso, nearestLine, north, obstacles, outlines, wedge, zonePoints,
 } from "./plan_layers.js";
 import { distanceText, drawZones, outlineSun, view as zoneView, zoneExit, zoneLegend, zoneLines, zoneNote } from "./plan_zone.js";
 
@@ -77,6 +77,7 @@ function paint(g, width, height, dpr) {
   else if (how === "difference") outlineSun(g, zone);
   if (replaying()) playbackMark(g, box);
   for (const name of names()) circles(g, name);
+  gauge(g);
   obstacles(g);
   for (const name of names()) if (name !== state.own) outlines(g, name);
   outlines(g, state.own);

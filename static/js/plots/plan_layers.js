@@ -145,6 +145,35 @@ export function obstacles(g) {
   }
 }
 
+/** The working gauge from above. A ceiling is everywhere and so is not drawn. */
+export function gauge(g) {
+  const middle = chart.view.centre;
+  for (const volume of state.site?.gauge ?? []) {
+    if (volume.idle || volume.kind === "ceiling") continue;
+    let named = null;
+    g.beginPath();
+    for (const { exterior, holes } of volume.plan) {
+      for (const ring of [exterior, ...holes]) {
+        ring.forEach((point, k) => {
+          g[k ? "lineTo" : "moveTo"](...chart.at(point));
+          const far = Math.hypot(point[0] - middle[0], point[1] - middle[1]);
+          if (!named || far < named.far) named = { point, far };
+        });
+        g.closePath();
+      }
+    }
+    if (!named) continue;
+    g.fillStyle = rgba(C.site, 0.14);
+    g.fill("evenodd");
+    g.setLineDash([6, 3]);
+    g.lineWidth = 1.2;
+    g.strokeStyle = C.site;
+    g.stroke();
+    g.setLineDash([]);
+    label(g, volume.name, ...chart.at(named.point), { halo: true });
+  }
+}
+
 /** ISO 5006: the visibility circle of 12 m radius and the rectangle 1 m outside the machine. */
 export function iso(g, own) {
   const [x, y] = chart.at(own.swing_center ?? own.position);
