@@ -4,12 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from backend.documents.gauge import (
-    AlignmentModel,
-    GaugeDocument,
-    NetworkModel,
-    gauge_document,
-)
+from backend.documents.gauge import AlignmentModel, GaugeDocument, NetworkModel
+from backend.documents.gauge_document import gauge_document
 from backend.errors import InputError
 from backend.gauge.read import read
 from backend.shell.app.wire import dumps
