@@ -4,12 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from backend.documents.gauge import (
-    AlignmentModel,
-    GaugeDocument,
-    NetworkModel,
-    gauge_document,
-)
+from backend.documents.gauge import AlignmentModel, GaugeDocument, NetworkModel, SkippedModel
+from backend.documents.gauge_document import gauge_document
 from backend.errors import InputError
 from backend.gauge.read import read
 from backend.shell.app.wire import dumps
@@ -55,26 +51,17 @@ def _words(document: GaugeDocument) -> str:
     lines += _more(len(document.features), "features")
     for network in document.networks:
         lines += _network(network)
-    lines += _listed("skipped", [f"{s.where}: {s.why}" for s in _only_skipped(document)])
-    lines += _listed("conflicts", _conflicts(document))
+    count = len(document.skipped) - len(
+        document.conflicts
+    )  # conflicts stand behind what is left out
+    lines += _listed("skipped", _told(document.skipped[:count]))
+    lines += _listed("conflicts", _told(document.skipped[count:]))
     lines += _listed("notes", document.notes)
     return "\n".join(lines)
 
 
-class _Left:
-    def __init__(self, where: str, why: str) -> None:
-        self.where, self.why = where, why
-
-
-def _only_skipped(document: GaugeDocument) -> list[_Left]:
-    """Without the conflicts, which stand behind what was skipped."""
-    count = len(document.skipped) - len(document.conflicts)
-    return [_Left(s.what, s.why) for s in document.skipped[:count]]
-
-
-def _conflicts(document: GaugeDocument) -> list[str]:
-    count = len(document.skipped) - len(document.conflicts)
-    return [f"{s.what}: {s.why}" for s in document.skipped[count:]]
+def _told(entries: list[SkippedModel]) -> list[str]:
+    return [f"{entry.what}: {entry.why}" for entry in entries]
 
 
 def _alignment(a: AlignmentModel) -> list[str]:

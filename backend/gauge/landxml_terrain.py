@@ -15,6 +15,7 @@ from backend.gauge.records import Surface
 from backend.gauge.units import Units
 from backend.spatial.types import Array
 
+MAX_POINTS = 10_000_000
 MAX_FACES = 20_000_000
 
 
@@ -41,10 +42,9 @@ class SurfaceReader:
         if not (abs(e) <= xml.LARGEST and abs(n) <= xml.LARGEST and abs(z) <= xml.LARGEST):
             self._complain(element, f"points that are not numbers or beyond {xml.LARGEST:g} m")
             return
-        if len(self._points) >= xml.MAX_POINTS * 5:
+        if len(self._points) >= MAX_POINTS:
             raise InputError(
-                f"{self._file}: a surface has more than {xml.MAX_POINTS * 5} points; allowed are "
-                "fewer."
+                f"{self._file}: a surface has more than {MAX_POINTS} points; allowed are fewer."
             )
         self._rows[(element.get("id") or "").strip()] = len(self._points)
         self._points.append((e, n, z))

@@ -42,7 +42,9 @@ class Units:
     imperial: bool = False
 
     def bearing(self, value: float) -> float:
-        """A direction in the file's unit [rad], still in the file's sense."""
+        """A direction in the file's unit [rad], still in the file's sense; NaN for none."""
+        if not abs(value) <= 1e6:
+            return math.nan
         if not self.sexagesimal:
             return value * self.direction
         sign, value = math.copysign(1.0, value), abs(value)

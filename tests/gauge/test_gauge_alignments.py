@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -193,6 +194,15 @@ def test_polylines_with_heights_make_their_own_profile() -> None:
     np.testing.assert_allclose(line.xyz, [[15, 0, 11.5], [30, 20, 14.5], [30, 40, 16]])
     np.testing.assert_allclose(line.heading, [0.0, math.pi / 2, math.pi / 2])
     np.testing.assert_allclose(line.gradient, [0.1, 0.075, 0.075])
+
+
+@pytest.mark.parametrize("unit", list(UNITS))
+def test_directions_need_not_be_stated(unit: str) -> None:
+    wanted = course("clothoid")
+    text = re.sub(r' dir\w*="[^"]*"', "", document(alignment(wanted, unit), unit).decode())
+    model = parse(text.encode(), "f.xml")
+    agrees(only(model), wanted)
+    assert model.conflicts == ()
 
 
 def test_heights_that_are_all_zero_are_no_heights() -> None:

@@ -32,9 +32,9 @@ EXTRA = (
     '</CircCurve><ParaCurve length="20">140 1</ParaCurve><PVI>210 3</PVI></ProfAlign></Profile>'
 )
 CRS = '<CoordinateSystem name="GK25FIN" epsgCode="3879"/>'
-WHOLE = document(
-    alignment(COURSE, extra=EXTRA) + ROOF + FEATURES + PIPES, space=INFRAMODEL, crs=CRS
-)
+REST = ROOF + FEATURES + PIPES
+WHOLE = document(alignment(COURSE, extra=EXTRA) + REST, space=INFRAMODEL, crs=CRS)
+FEET = document(alignment(COURSE, "feet", EXTRA) + REST, "feet", crs=CRS)
 
 
 def judged(data: bytes) -> str:
@@ -83,12 +83,12 @@ def test_flipped_bytes() -> None:
 
 def test_changed_numbers() -> None:
     rng = random.Random(11)
-    text = WHOLE.decode()
-    spots = [i for i, c in enumerate(text) if c.isdigit()]
+    texts = [WHOLE.decode(), FEET.decode()]
     words = ["NaN", "1e308", "-1e308", "INF", "", "0", "-1", "1e-300", "x", "9" * 400, "1,5", "-"]
     seen = set()
     for _ in range(150):
-        i = rng.choice(spots)
+        text = rng.choice(texts)
+        i = rng.choice([i for i, c in enumerate(text) if c.isdigit()])
         j = i
         while text[j].isdigit() or text[j] in ".-":
             j += 1

@@ -1,8 +1,7 @@
-"""Points and lines as CSV; meshes; IFC without its library."""
+"""Points and lines as CSV; meshes."""
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -88,11 +87,3 @@ def test_a_mesh(tmp_path: Path) -> None:
     bad.write_bytes(b"solid nothing\n")
     with pytest.raises(InputError):
         read(bad)
-
-
-def test_ifc_names_what_is_missing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "ifcopenshell", None)
-    path = tmp_path / "a.ifc"
-    path.write_text("ISO-10303-21;")
-    with pytest.raises(InputError, match=r"excavator-cockpit\[ifc\]"):
-        read(path)
