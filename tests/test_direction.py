@@ -30,9 +30,6 @@ ROOMS: dict[str, set[str]] = {
         "backend.fusion",
     },
     "backend.safety": {"backend.collision", "backend.machine", "backend.spatial"},
-    "backend.gauge": {
-        *("backend.collision", "backend.machine", "backend.spatial", "backend.errors"),
-    },
     "backend.planning": {
         *("backend.safety", "backend.collision", "backend.machine", "backend.spatial"),
         "backend.errors",

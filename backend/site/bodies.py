@@ -16,6 +16,7 @@ from backend.gauge.volumes import LimitVolume
 from backend.machine.bodies import Progress, fitted
 from backend.machine.meshes import mesh_triangles
 from backend.site.gauge import site_options, site_volumes
+from backend.site.gauge_sources import source_features
 from backend.site.site import Site
 from backend.site.tables import ObstacleMesh
 from backend.spatial.boxes import NO_BOXES, Boxes, concatenated
@@ -79,9 +80,9 @@ def site_bodies(
     site: Site, progress: Progress | None = None, features: Iterable[Feature] = ()
 ) -> SiteBodies:
     """Obstacles as they are, meshes in the boxes that are fitted to them (once, then remembered),
-    and the limit volumes of the site's tables and of other `features` in the site frame.
+    and the limit volumes of the site's tables, its files and other `features` in the site frame.
 
-    Raises InputError for a mesh that cannot be read, or a feature that makes no volume.
+    Raises InputError for a mesh or file that cannot be read, or a feature that makes no volume.
     """
     boxes = [site.obstacle_boxes()]
     names = [obstacle.name for obstacle in site.obstacles]
@@ -89,7 +90,7 @@ def site_bodies(
         parts = _boxes_of(mesh, site, progress)
         boxes.append(parts)
         names += [f"{mesh.name}/{k}" for k in range(len(parts))]
-    volumes = site_volumes(site, features)
+    volumes = site_volumes(site, (*source_features(site), *features))
     options = site_options(site)
     idle = {v.name: why for v in volumes if (why := why_idle(v, options))}
     for volume in volumes:

@@ -63,12 +63,25 @@ class GaugeRules(Table):
 
 
 class GaugeSource(Table):
-    """A file of features. file: relative to the site file; epsg: of its CRS, where that is not the
-    site's or the file names it wrongly.
+    """A file of features, such as LandXML. file: relative to the site file; epsg: of its CRS, where
+    the file names none or names it wrongly: the site's.
+
+    tracks, buried, overhead, poles: patterns such as "*" or "OHL*" for the names, or kinds, of what
+    counts as such: alignments; pipes, cables and other lines; wires; points. Of what matches
+    several the first of buried, overhead and poles counts. height: of stations of a track whose own
+    height is not known; diameter: of lines that state none; pole_radius, pole_height [m].
     """
 
     file: Annotated[str, Field(min_length=1)]
     epsg: int | None = None
+    tracks: tuple[str, ...] = ("*",)
+    buried: tuple[str, ...] = ("pipe", "cable")
+    overhead: tuple[str, ...] = ()
+    poles: tuple[str, ...] = ()
+    height: float | None = None
+    diameter: Positive = 0.1
+    pole_radius: Positive = 0.2
+    pole_height: Positive = 9.0
 
 
 class _Feature(Table):
