@@ -125,8 +125,19 @@ def _fitted(sweep: Sweep, start: float, end: float) -> Piece:
             f"{sweep.line.name}: the line's place or height is not known everywhere between "
             f"{start:.2f} and {end:.2f} m; allowed is a line that is."
         )
-    R = _axes(frames)
-    origin = frames.origin[count // 2]
+    piece = _prism(sweep, start, end, frames, polygons, _axes(frames, chord=True))
+    if sweep.square and piece.excess > sweep.tolerance:
+        # Where growing cant lifts the section, only a box along the track can end with the line.
+        along = _prism(sweep, start, end, frames, polygons, _axes(frames, chord=False))
+        piece = min(piece, along, key=lambda piece: piece.excess)
+    return piece
+
+
+def _prism(
+    sweep: Sweep, start: float, end: float, frames: TrackFrames, polygons: Array, R: Array
+) -> Piece:
+    """The piece with axes R around the polygons of stations from start to end."""
+    origin = frames.origin[len(polygons) // 2]
     local = (frames.place(polygons) - origin) @ R
     support = local[..., 1:] @ sweep.section.normals.T
     corners = _corners(sweep.section.normals, support.max(axis=(0, 1)) + _between(support))
@@ -148,11 +159,14 @@ def _fitted(sweep: Sweep, start: float, end: float) -> Piece:
     return Piece(start, end, stack(caps.reshape(-1, 3)), R, max(float(excess), *over))
 
 
-def _axes(frames: TrackFrames) -> Array:
-    """(3, 3): x along the chord, y to the left as the section stands in the middle, z."""
-    chord = frames.origin[-1] - frames.origin[0]
-    x = chord / np.linalg.norm(chord)
-    y = frames.lateral[len(frames.lateral) // 2]
+def _axes(frames: TrackFrames, chord: bool) -> Array:
+    """(3, 3): x along the chord or the track, y to the left as the section stands in the middle,
+    z.
+    """
+    middle = len(frames.lateral) // 2
+    x = frames.origin[-1] - frames.origin[0] if chord else frames.tangent[middle]
+    x = x / np.linalg.norm(x)
+    y = frames.lateral[middle]
     y = y - (y @ x) * x
     y = y / np.linalg.norm(y)
     return np.stack([x, y, np.cross(x, y)], axis=1)
@@ -203,7 +217,8 @@ def _slices(frames: TrackFrames, edges: Array, x: Array) -> tuple[Array, Array]:
 def _overhang(sweep: Sweep, station: float, way: int, over: float, edges: Array, R: Array) -> float:
     """The excess of what a box has beyond the plane of its last station by up to `over` [m].
 
-    There it is in the planes of the next stations; beyond the line's end it is in none.
+    There it is in the planes of the next stations; beyond the line's end, or where nothing is known
+    of it, it is in none.
     """
     last = 0.0 if way < 0 else sweep.line.length
     frames = sweep.frames(np.array([station]))
@@ -212,6 +227,9 @@ def _overhang(sweep: Sweep, station: float, way: int, over: float, edges: Array,
     rest = abs(last - station)
     s = station + way * np.linspace(0.0, min(reach, rest), 4)
     frames = sweep.frames(s)
+    if not np.isfinite(frames.origin).all():
+        rest = 0.0
+        frames = sweep.frames(s[:1])
     slices, _ = _slices(frames, edges, R[:, 0])
     excess = float(outside_distance(slices, sweep.polygons(frames)).max())
     return excess if reach <= rest else math.hypot(excess, max(over - rest, 0.0))

@@ -63,6 +63,7 @@ CURVES = [
         height=lambda s: 0.03 * s - s**2 / 1000.0,
         gradient=lambda s: 0.03 - s / 500.0,
     ),
+    Curve("steep_ramp", 20.0, circle(-400.0), cant=lambda s: 0.01 * s - 0.05),
     Curve(
         "all_at_once",
         60.0,
@@ -275,6 +276,19 @@ def test_a_stretch_that_is_not_known_is_a_gap_and_no_height_is_refused() -> None
         volume_of(flat, TrackRule())
     known = track_volume(Track(InFrame(flat, np.zeros(3), 2.0)), TrackRule(), TOLERANCE, HERE, 1e3)
     assert known.boxes.corners()[0, :, 2].min() == pytest.approx(2.0, abs=1e-6)
+
+
+def test_a_curve_ends_at_a_stretch_that_is_not_known() -> None:
+    def plan(s: Array) -> tuple[Array, Array, Array, Array]:
+        x, y, heading, curvature = circle(200.0)(s)
+        return np.where(s > 30.0, np.nan, x), y, heading, curvature
+
+    volume = volume_of(Curve("cut", 60.0, plan), TrackRule())
+    whole = Curve("whole", 30.0, circle(200.0))
+    envelope = envelope_of(whole, TrackRule())
+    assert volume.contains(envelope.points(40, np.random.default_rng(7)), 2e-3).all()
+    corners = volume.boxes.corners().reshape(-1, 3)
+    assert max(envelope.distance(point) for point in corners) <= TOLERANCE + 2e-3
 
 
 def test_lines_of_another_frame() -> None:
