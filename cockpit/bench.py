@@ -16,6 +16,7 @@ from rich.table import Table
 from backend.collision import box_distance
 from backend.collision.closest import closest_pairs, fcl_box, fcl_distance
 from backend.documents.bench import BenchDocument, BenchMachine, BenchRow
+from backend.errors import InputError
 from backend.machine.model import Machine
 from backend.pipeline.config import Config
 from backend.pipeline.images import SunParameters, ordered_pairs, pair_image
@@ -24,6 +25,7 @@ from backend.pipeline.records import Snapshot
 from backend.pipeline.step import initial, step
 from backend.site.site import Site, load_site
 from backend.spatial import rotation, transform
+from cockpit.bench_collision import collision_rows
 from cockpit.bench_cspace import cspace_rows
 from cockpit.bench_input import cycles
 from cockpit.bench_live import crowded_rows, live_rows
@@ -35,8 +37,11 @@ from cockpit.desk import load_models, make_config
 CYCLES = 500
 
 
-def run_bench(as_json: bool, seconds: float) -> None:
-    """Measure everything; print a table, or the document of `cockpit schema bench`."""
+def run_bench(as_json: bool, seconds: float, only: str = "") -> None:
+    """Measure everything; print a table, or the document of `cockpit schema bench`.
+
+    only: measure just the parts with this in their names. Raises InputError when there is none.
+    """
     site = load_site("demo")
     models = load_models(site)
     config = make_config(site, models, (), "LIVE")
@@ -44,12 +49,17 @@ def run_bench(as_json: bool, seconds: float) -> None:
     parts: list[tuple[str, Callable[[], list[BenchRow]]]] = [
         ("fast loop and images", lambda: pipeline_rows(site, config)),
         ("distances", lambda: distance_rows(next(iter(models.values())))),
+        ("collision server", collision_rows),
         ("joint images", cspace_rows),
         ("recording", lambda: recording_rows(site, config, seconds)),
         ("a session of an hour", lambda: session_rows(site, config, seconds)),
         ("live, over Zenoh", lambda: live_rows(seconds)),
         ("live, on a crowded site", lambda: crowded_rows(seconds)),
     ]
+    known = ", ".join(name for name, _ in parts)
+    parts = [(name, measure) for name, measure in parts if only in name]
+    if not parts:
+        raise InputError(f"--only {only}: no part is called so; there are: {known}.")
     with Progress(console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("bench", total=len(parts))
         for name, measure in parts:

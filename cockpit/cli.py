@@ -290,11 +290,12 @@ def bench(
     seconds: Annotated[
         float, typer.Option(min=1.0, help="Length of the live measurements [s].")
     ] = 10.0,
+    only: Annotated[str, typer.Option(help="Only parts with this in their names.")] = "",
 ) -> None:
     """Measure speed and memory, against peers in the same run."""
     from cockpit.bench import run_bench
 
-    run_bench(json_, seconds)
+    run_bench(json_, seconds, only)
 
 
 @app.command()

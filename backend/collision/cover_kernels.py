@@ -51,7 +51,7 @@ def cover(
             continue
         gap = np.inf
         for i in range(ca.shape[0]):
-            gap = min(gap, node_bound(lows[node], highs[node], ca[i], Ra[i], ha[i], wide[i]))
+            gap = min(gap, node_bound(lows, highs, node, ca[i], Ra[i], ha[i], wide[i]))
         if not gap <= reach:
             continue
         size = 0.0

@@ -12,6 +12,7 @@ from backend.collision.tree_kernels import axis_aligned, node_bound
 from backend.collision.triangle_kernels import box_triangle, triangle_gap
 from backend.spatial.types import Array, IntArray
 
+_TOUCHING = 1e-6  # closest points nearer than this give no direction [m]
 _DEEP = 64  # of the stack; a tree is never deeper than half of it
 
 
@@ -53,21 +54,30 @@ def search(
         if counts[link] == k_most:
             limit = min(reach, max(distances[link, k_most - 1], 0.0))
         best[:] = np.inf  # of each octant
-        stack[0], bounds[0] = 1, node_bound(lows[1], highs[1], c, R, h, around)
+        # Along the direction of the closest points so far most of what is left is seen to be
+        # farther away: the gap is n . x - offset.
+        n0 = n1 = n2 = offset = 0.0
+        least = np.inf
+        stack[0], bounds[0] = 1, node_bound(lows, highs, 1, c, R, h, around)
         top = 1
         while top > 0:
             top -= 1
             node = stack[top]
             if bounds[top] > limit:
                 continue
+            gap = n0 * (lows[node, 0] if n0 > 0.0 else highs[node, 0]) - offset
+            gap += n1 * (lows[node, 1] if n1 > 0.0 else highs[node, 1])
+            gap += n2 * (lows[node, 2] if n2 > 0.0 else highs[node, 2])
+            if gap > limit:
+                continue
             if band >= 0.0:
                 _sides(lows[node], highs[node], c, R, low, high)
-                if bounds[top] >= _worst(low, high, best):
+                if max(bounds[top], gap) >= _worst(low, high, best):
                     continue
             if node < leaves:
                 left, right = 2 * node, 2 * node + 1
-                to_left = node_bound(lows[left], highs[left], c, R, h, around)
-                to_right = node_bound(lows[right], highs[right], c, R, h, around)
+                to_left = node_bound(lows, highs, left, c, R, h, around)
+                to_right = node_bound(lows, highs, right, c, R, h, around)
                 first, second = (left, right) if to_left <= to_right else (right, left)
                 near, far = min(to_left, to_right), max(to_left, to_right)
                 if far <= limit:
@@ -93,6 +103,12 @@ def search(
                     else:
                         distance = pair_distance(c, R, h, ci, Ri, hi, pair)
                 elif kind == TRIANGLES:
+                    gap = np.inf
+                    for i in range(3):
+                        at_n = n0 * corners[item, i, 0] + n1 * corners[item, i, 1]
+                        gap = min(gap, at_n + n2 * corners[item, i, 2] - offset)
+                    if gap > limit:
+                        continue
                     for i in range(3):
                         for k in range(3):
                             V[i, k] = 0.0
@@ -104,7 +120,7 @@ def search(
                         high[k] = max(V[0, k], V[1, k], V[2, k])
                         square += max(low[k] - h[k], -h[k] - high[k], 0.0) ** 2
                     most = limit if band < 0.0 else min(limit, _worst(low, high, best))
-                    if square > most * most or triangle_gap(V, h) > most:
+                    if gap > most or square > most * most or triangle_gap(V, h) > most:
                         continue
                     distance = box_triangle(V, h, pair)
                     octant = _octant(pair[0])
@@ -133,6 +149,14 @@ def search(
                 if band < 0.0:
                     octant = 0
                 best[octant] = min(best[octant], distance)
+                if _TOUCHING < distance < least:
+                    least = distance
+                    n0 = (pair[1, 0] - pair[0, 0]) / distance
+                    n1 = (pair[1, 1] - pair[0, 1]) / distance
+                    n2 = (pair[1, 2] - pair[0, 2]) / distance
+                    offset = n0 * c[0] + n1 * c[1] + n2 * c[2]
+                    for k in range(3):
+                        offset += h[k] * abs(n0 * R[0, k] + n1 * R[1, k] + n2 * R[2, k])
                 key = 8 * bodies[item] + octant
                 _insert(link, key, item, distance, pair, counts, keys, which, distances, points)
                 if band >= 0.0 and distance <= 0.0:

@@ -67,24 +67,27 @@ def axis_aligned(R: Array, h: Array, out: Array) -> None:
 
 
 @njit(cache=True, nogil=True)
-def node_bound(low: Array, high: Array, c: Array, R: Array, h: Array, around: Array) -> float:
+def node_bound(
+    lows: Array, highs: Array, node: int, c: Array, R: Array, h: Array, around: Array
+) -> float:
     """Lower bound of the distance of a node to an oriented box [m]; infinite for empty nodes.
 
     around: (3,) of `axis_aligned`. The larger of the distances in the site's and the box's axes.
     """
-    if low[0] > high[0]:
+    if lows[node, 0] > highs[node, 0]:
         return np.inf
-    m0, m1, m2 = 0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), 0.5 * (low[2] + high[2])
-    w0, w1, w2 = high[0] - m0, high[1] - m1, high[2] - m2
-    d0, d1, d2 = m0 - c[0], m1 - c[1], m2 - c[2]
-    outer = max(abs(d0) - w0 - around[0], 0.0) ** 2
-    outer += max(abs(d1) - w1 - around[1], 0.0) ** 2
-    outer += max(abs(d2) - w2 - around[2], 0.0) ** 2
+    w0 = 0.5 * (highs[node, 0] - lows[node, 0])
+    w1 = 0.5 * (highs[node, 1] - lows[node, 1])
+    w2 = 0.5 * (highs[node, 2] - lows[node, 2])
+    d0, d1, d2 = lows[node, 0] + w0 - c[0], lows[node, 1] + w1 - c[1], lows[node, 2] + w2 - c[2]
+    g0 = max(abs(d0) - w0 - around[0], 0.0)
+    g1 = max(abs(d1) - w1 - around[1], 0.0)
+    g2 = max(abs(d2) - w2 - around[2], 0.0)
+    outer = g0 * g0 + g1 * g1 + g2 * g2
     inner = 0.0
     for k in range(3):
-        along = R[0, k] * d0 + R[1, k] * d1 + R[2, k] * d2
-        wide = abs(R[0, k]) * w0 + abs(R[1, k]) * w1 + abs(R[2, k]) * w2
-        gap = abs(along) - wide - h[k]
-        if gap > 0.0:
-            inner += gap * gap
+        r0, r1, r2 = R[0, k], R[1, k], R[2, k]
+        along = abs(r0 * d0 + r1 * d1 + r2 * d2)
+        gap = max(along - abs(r0) * w0 - abs(r1) * w1 - abs(r2) * w2 - h[k], 0.0)
+        inner += gap * gap
     return float(np.sqrt(max(outer, inner)))
