@@ -42,10 +42,8 @@ def test_every_panel_lives_and_both_machines_move(
     assert moved == {"left", "right"}
     # "limits" changes only when something is near.
     assert changed >= set(CANVASES) - {"limits"}
-    for side in ("own", "partner"):
-        watched.until(
-            f"['fresh', 'old'].includes(document.getElementById('camera-{side}').dataset.state)"
-        )
+    for side in ("own", "partner"):  # of both cabs
+        watched.until(f"Number(document.getElementById('camera-{side}').dataset.count) > 1", 120.0)
     watched.page.screenshot(path=artifacts / "demo-1920x1080.png")
     assert watched.errors == []
 

@@ -6,6 +6,17 @@ import { transit } from "../state.js";
 
 const FIRST_WAIT = 500, LONGEST_WAIT = 4000; // ms between two attempts
 
+/** A JPEG (Uint8Array) to be drawn and closed. A blob would go by another process, which can take seconds on a busy computer. */
+async function decoded(jpeg) {
+  if (typeof ImageDecoder === "undefined") return createImageBitmap(new Blob([jpeg], { type: "image/jpeg" })); // not over plain HTTP
+  const decoder = new ImageDecoder({ type: "image/jpeg", data: jpeg });
+  try {
+    return (await decoder.decode()).image;
+  } finally {
+    decoder.close();
+  }
+}
+
 /** Draws on `canvas` until `close` is called. `taken` and `by` say how old the newest picture is. */
 export function openPictures(machine, index, canvas) {
   const feed = { taken: null, by: "", trouble: "", count: 0, close };
@@ -15,11 +26,12 @@ export function openPictures(machine, index, canvas) {
 
   async function draw(header, jpeg, arrival) {
     try {
-      const bitmap = await createImageBitmap(new Blob([jpeg], { type: "image/jpeg" }));
-      if (closed) return bitmap.close();
-      if (canvas.width !== bitmap.width || canvas.height !== bitmap.height) Object.assign(canvas, { width: bitmap.width, height: bitmap.height });
-      canvas.getContext("2d").drawImage(bitmap, 0, 0);
-      bitmap.close();
+      const picture = await decoded(jpeg);
+      if (closed) return picture.close();
+      const [width, height] = [picture.displayWidth ?? picture.width, picture.displayHeight ?? picture.height];
+      if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
+      canvas.getContext("2d").drawImage(picture, 0, 0);
+      picture.close();
       feed.count += 1;
       feed.taken = arrival - 1000 * (header.age + transit(header.wall));
       feed.by = header.by;

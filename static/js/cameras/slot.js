@@ -81,7 +81,7 @@ export function slot(side, act) {
     veil.hidden = !lost;
     if (lost) {
       writeWord(Number.isFinite(old) ? `UNKNOWN · no picture for ${seconds(old)}` : "No picture yet", title);
-      write(why, feed.trouble ? `${upper(feed.trouble)}. It is tried again.` : "");
+      write(why, feed.trouble ? `${upper(feed.trouble)}. Trying again.` : "");
     }
     mark(node, "state", lost ? (feed.taken === null ? "none" : "lost") : level);
     mark(node, "count", feed.count);
