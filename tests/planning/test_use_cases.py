@@ -60,8 +60,8 @@ def test_who_keeps_pushing_stands_before_the_pole(monkeypatch):
     done = run("scaling", RAIL, rail_site.pole_limits(), q_start, wish, Settings(), 14.0)
     distance = pole_distance(done.q)
     assert (distance >= 0.2).all()
-    assert distance[-1] < 0.205
-    assert np.abs(done.rates[-1]).max() < 1e-3
+    assert distance[-1] < 0.215
+    assert np.abs(done.rates[-1]).max() < 0.01
 
 
 def test_the_way_back_from_the_pole_is_at_full_speed(pole):
