@@ -15,6 +15,10 @@ from backend.spatial.types import Array, BoolArray
 
 FLAT = 1e-9
 """Corners that turn by no more than this (sine) are no corners."""
+SAME = 1e-9
+"""Corners that are no farther apart than this are one [m]."""
+NEAR = 1e-4
+"""Nothing is cut between corners that are no farther apart than this [m]."""
 
 
 @dataclass(frozen=True)
@@ -109,7 +113,9 @@ def _counter_clockwise(ring: Array) -> Array:
 def _corners(ring: Array) -> Array:
     """Counter-clockwise and without points along its sides."""
     ring = _counter_clockwise(ring)
-    return ring[np.abs(_turns(ring)) > FLAT]
+    ring = ring[np.linalg.norm(np.roll(ring, -1, axis=0) - ring, axis=1) > SAME]
+    back = ((ring - np.roll(ring, 1, axis=0)) * (np.roll(ring, -1, axis=0) - ring)).sum(axis=1) < 0
+    return ring[(np.abs(_turns(ring)) > FLAT) | back]  # a needle's ends turn back, and are corners
 
 
 def outside_distance(points: Array, polygons: Array) -> Array:
@@ -138,11 +144,20 @@ def cover(shape: BaseGeometry, max_excess: float, most: int) -> list[Rectangle]:
     for polygon in shapely.get_parts(shape):
         if isinstance(polygon, Polygon) and polygon.area > 1e-9:
             ways = [_parts(polygon), *(_slabs(polygon, axis) for axis in _main_axes(polygon))]
+            ways = [way for way in ways if _complete(way, polygon)]
+            if not ways:
+                ways = [[_corners(np.array(polygon.convex_hull.exterior.coords)[:-1, :2])]]
             covers: list[list[Rectangle]] = [
                 [r for part in way for r in rectangles(part, max_excess, most)] for way in ways
             ]
             found += covers[int(np.argmin([len(rectangles) for rectangles in covers]))]
     return found
+
+
+def _complete(parts: list[Array], polygon: Polygon) -> bool:
+    """Whether nothing was lost: overlays of almost coincident sides may go wrong."""
+    lost = polygon.area - sum(_area(part) for part in parts)
+    return bool(lost <= 1e-6 * max(polygon.length, 1.0))
 
 
 def rectangles(part: Array, max_excess: float, most: int) -> list[Rectangle]:
@@ -177,7 +192,8 @@ def _slabs(polygon: Polygon, axis: Array) -> list[Array]:
     R = np.stack([axis, [-axis[1], axis[0]]], axis=1)
     local = shapely.transform(polygon, lambda points: points @ R)
     rings = [local.exterior, *local.interiors]
-    x = np.unique(np.concatenate([np.array(ring.coords)[:, 0] for ring in rings]).round(6))
+    x = np.unique(np.concatenate([np.array(ring.coords)[:, 0] for ring in rings]))
+    x = x[np.concatenate([[True], np.diff(x) > NEAR])]  # no needles between corners side by side
     _, low, _, high = local.bounds
     parts = []
     for left, right in pairwise([x[0] - 1.0, *x[1:-1], x[-1] + 1.0]):

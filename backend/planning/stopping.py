@@ -16,7 +16,8 @@ from backend.machine.stopping import full_stopping_distances
 from backend.planning.records import Thresholds
 from backend.spatial.types import Array
 
-_INSTANTS = 5
+_SPACING = 0.2  # [m] of the tool's way between two postures of a stop that are judged
+_FEWEST, _MOST = 4, 24  # of them
 
 
 def stopping_ways(machine: Machine, q: Array, latency: float) -> Array:
@@ -73,12 +74,13 @@ def sufficient_thresholds(
 
 
 def braking_path(machine: Machine, q: Array, rates: Array, dt: float) -> Array:
-    """(_INSTANTS + 1, n) postures while all joints brake as hard as they can after `rates` (n,)
-    were held for dt [s]: the first after dt, the last at rest.
+    """(m, n) postures while all joints brake as hard as they can after `rates` (n,) were held for
+    dt [s]: the first after dt, the last at rest; the longer the way, the more.
     """
     a = machine.max_acceleration
-    longest = float((np.abs(rates) / a).max())
-    t = np.linspace(0.0, longest, _INSTANTS + 1)[:, None]
+    way = float((0.5 * rates**2 / a).sum()) * machine.max_reach
+    count = int(np.clip(np.ceil(way / _SPACING), _FEWEST, _MOST))
+    t = np.linspace(0.0, float((np.abs(rates) / a).max()), count + 1)[:, None]
     braked = np.minimum(t, np.abs(rates) / a)
     return np.asarray(q + rates * dt + np.sign(rates) * (np.abs(rates) - 0.5 * a * braked) * braked)
 
@@ -95,9 +97,10 @@ def stoppable(
     """`rates` (n,) where a stop after them stays clear, else `before` (n,) braked fully.
 
     clearance: postures (m, n) -> (m,) shortest distances [m]; clear is at least `keep` [m], or
-    nowhere nearer than now. By induction a machine that starts clear can always stop clear: the
-    braking that is done was found clear one step earlier. Returns the rates and whether they are
-    the ones asked for.
+    nowhere nearer than now. A machine that starts clear can then always stop clear, because the
+    braking that is done was found clear one step earlier; exact but for what passes between the
+    postures judged, which `keep` must cover. Returns the rates and whether they are the ones asked
+    for.
     """
     path = braking_path(machine, q, rates, dt)
     found = clearance(np.concatenate([q[None], path]))
