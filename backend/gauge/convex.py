@@ -115,7 +115,8 @@ def _corners(ring: Array) -> Array:
     ring = _counter_clockwise(ring)
     ring = ring[np.linalg.norm(np.roll(ring, -1, axis=0) - ring, axis=1) > SAME]
     back = ((ring - np.roll(ring, 1, axis=0)) * (np.roll(ring, -1, axis=0) - ring)).sum(axis=1) < 0
-    return ring[(np.abs(_turns(ring)) > FLAT) | back]  # a needle's ends turn back, and are corners
+    # A needle's ends turn back, and are corners.
+    return np.asarray(ring[(np.abs(_turns(ring)) > FLAT) | back])
 
 
 def outside_distance(points: Array, polygons: Array) -> Array:
@@ -146,7 +147,7 @@ def cover(shape: BaseGeometry, max_excess: float, most: int) -> list[Rectangle]:
             ways = [_parts(polygon), *(_slabs(polygon, axis) for axis in _main_axes(polygon))]
             ways = [way for way in ways if _complete(way, polygon)]
             if not ways:
-                ways = [[_corners(np.array(polygon.convex_hull.exterior.coords)[:-1, :2])]]
+                ways = [[_corners(shapely.get_coordinates(polygon.convex_hull)[:-1])]]
             covers: list[list[Rectangle]] = [
                 [r for part in way for r in rectangles(part, max_excess, most)] for way in ways
             ]
