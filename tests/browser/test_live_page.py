@@ -42,6 +42,7 @@ def test_every_panel_lives_and_both_machines_move(
     assert moved == {"left", "right"}
     # "limits" changes only when something is near.
     assert changed >= set(CANVASES) - {"limits"}
+    watched.page.keyboard.press("c")  # a demo's pictures are shown when they are asked for
     for side in ("own", "partner"):  # of both cabs
         watched.until(f"Number(document.getElementById('camera-{side}').dataset.count) > 1", 120.0)
     watched.page.screenshot(path=artifacts / "demo-1920x1080.png")
@@ -78,7 +79,7 @@ def test_nothing_is_clipped_and_nothing_scrolls(
 
 def test_the_3d_scene_shows_the_machines(moving: Backend, watch: Watch) -> None:
     watched = watch(moving.url, SIZES[0])
-    watched.page.keyboard.press("c")  # the cameras' pictures, over the scene, have machines in them
+    # The cameras' pictures, over the scene, would have machines in them.
     watched.until("document.getElementById('camera-own').hidden")
     deadline = time.monotonic() + 60.0
     warm = 0

@@ -2,7 +2,7 @@
 
 import { $, make, mark, write } from "../words.js";
 import { described, names, replaying, state } from "../state.js";
-import { change, prefs, recall } from "./prefs.js";
+import { change, prefs, recall, shown } from "./prefs.js";
 import { slot } from "./slot.js";
 
 const slots = {};
@@ -15,7 +15,7 @@ const some = () => names().some((name) => listed(name).length > 0);
 
 export function toggleCameras() {
   if (!some()) return;
-  change({ shown: !prefs.shown, large: "" });
+  change({ shown: !shown(), large: "" });
   update();
 }
 
@@ -57,14 +57,14 @@ export function update() {
   if (!state.site) return;
   recall();
   const recorded = replaying();
-  const seen = prefs.shown && !recorded && !document.hidden;
+  const seen = shown() && !recorded && !document.hidden;
   for (const [side, one] of Object.entries(slots)) {
     const name = seen ? machineOf(side) : null;
     one.show(name, name === null ? 0 : pick(name), prefs.large === side);
   }
   mark(document.body, "machines", names().length < 2 ? "two" : prefs.machines);
   buttons.shown.hidden = recorded || !some();
-  buttons.shown.setAttribute("aria-pressed", String(prefs.shown));
+  buttons.shown.setAttribute("aria-pressed", String(shown()));
   buttons.machines.hidden = names().length < 2;
   write(buttons.machines, prefs.machines === "two" ? "Both" : "Own");
   buttons.machines.setAttribute("aria-pressed", String(prefs.machines === "two"));

@@ -2,11 +2,13 @@
 
 import { state } from "../state.js";
 
-const START = { shown: true, machines: "two", large: "", picks: {} };
+// shown: null until somebody chose. A simulation draws its pictures on the computer that shows them.
+const START = { shown: null, machines: "two", large: "", picks: {} };
 const key = () => `cameras ${state.you?.who ?? ""}`;
 
 let who = null;
 export let prefs = { ...START };
+export const shown = () => prefs.shown ?? state.site?.mode !== "DEMO";
 
 /** Once it is known who sits here: what they left. True when it is another than before. */
 export function recall() {
