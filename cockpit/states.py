@@ -10,7 +10,8 @@ from backend.errors import InputError
 from backend.fusion.crs import SiteFrame
 from backend.machine.load import load_machine
 from backend.machine.model import Machine
-from backend.site.bodies import NO_SITE_BODIES, SiteBodies, site_bodies
+from backend.site.bodies import site_bodies
+from backend.site.named_bodies import NO_SITE_BODIES, SiteBodies
 from backend.site.site import Site
 
 

@@ -23,7 +23,7 @@ from backend.machine.model import Machine
 from backend.pipeline.images import SunParameters, pair_key
 from backend.pipeline.place import base_transform
 from backend.pipeline.records import Body3D
-from backend.site.bodies import NO_SITE_BODIES, SiteBodies
+from backend.site.named_bodies import NO_SITE_BODIES, SiteBodies
 from backend.spatial.boxes import Boxes
 from backend.spatial.types import Array
 

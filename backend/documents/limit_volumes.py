@@ -7,7 +7,7 @@ from typing import Any
 from shapely.geometry import Polygon
 
 from backend.gauge.volumes import LimitVolume
-from backend.site.bodies import SiteBodies
+from backend.site.named_bodies import SiteBodies
 
 
 def volumes_document(site: SiteBodies) -> list[dict[str, Any]]:

@@ -21,7 +21,7 @@ from backend.machine.model import Machine
 from backend.pipeline.place import base_transform, place
 from backend.pipeline.records import Body3D
 from backend.pipeline.surroundings import Surroundings, surroundings
-from backend.site.bodies import NO_SITE_BODIES, SiteBodies
+from backend.site.named_bodies import NO_SITE_BODIES, SiteBodies
 from backend.spatial.boxes import Boxes, concatenated
 from backend.spatial.types import Array
 

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from backend.documents.limit_volumes import volumes_document
 from backend.machine.model import Machine
 from backend.pipeline.config import Config
 from backend.site.site import Site
 from backend.site.tables import SiteMachine
+
+if TYPE_CHECKING:
+    from backend.site.named_bodies import SiteBodies
 
 
 def site_document(site: Site, config: Config) -> dict[str, Any]:
@@ -44,8 +46,16 @@ def site_document(site: Site, config: Config) -> dict[str, Any]:
             }
             for k, name in enumerate(standing.names)
         ],
-        "gauge": volumes_document(config.site),
+        "gauge": _gauge(config.site),
     }
+
+
+def _gauge(site: SiteBodies) -> list[dict[str, Any]]:
+    if not site.volumes:
+        return []
+    from backend.documents.limit_volumes import volumes_document  # shapely, for who has a gauge
+
+    return volumes_document(site)
 
 
 def cameras(machine: SiteMachine) -> list[dict[str, Any]]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from backend.fusion.crs import SiteFrame
 from backend.machine.model import Machine
 from backend.safety.partner import Limits
-from backend.site.bodies import NO_SITE_BODIES, SiteBodies
+from backend.site.named_bodies import NO_SITE_BODIES, SiteBodies
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from backend.safety import site
 from backend.safety.approach import Approach, approach_standing, standing_reach
 from backend.safety.hulls import hulls
 from backend.safety.record import Concern
-from backend.site.bodies import SiteBodies
+from backend.site.named_bodies import SiteBodies
 from backend.spatial.boxes import Boxes
 from backend.spatial.identity import ByIdentity
 from backend.spatial.types import Array

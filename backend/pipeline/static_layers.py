@@ -15,7 +15,7 @@ from backend.cspace.exact import OUTER, arm_model, blocked, self_blocked
 from backend.cspace.exact import joint_grid as whole_grid
 from backend.fusion.pose import FusedPose
 from backend.machine.model import Machine
-from backend.site.bodies import SiteBodies
+from backend.site.named_bodies import SiteBodies
 from backend.spatial import rotation, transform
 from backend.spatial.identity import ByIdentity
 from backend.spatial.types import AnyArray, Array

@@ -11,7 +11,7 @@ from backend.fusion.pose import Validity
 from backend.machine.model import Machine
 from backend.pipeline.config import Config
 from backend.pipeline.records import Body3D, MachineState, PairDistance
-from backend.site.bodies import SiteBodies
+from backend.site.named_bodies import SiteBodies
 from backend.spatial import transform
 from backend.spatial.boxes import Boxes, concatenated
 from backend.spatial.types import BoolArray

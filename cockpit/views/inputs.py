@@ -11,7 +11,8 @@ from shapely.geometry.base import BaseGeometry
 
 from backend.machine.model import Machine
 from backend.pipeline.records import Snapshot
-from backend.site.bodies import SiteBodies, site_bodies
+from backend.site.bodies import site_bodies
+from backend.site.named_bodies import SiteBodies
 from backend.site.site import Site
 from backend.spatial.boxes import NO_BOXES, Boxes, concatenated
 from backend.spatial.types import Array

@@ -9,7 +9,7 @@ import numpy as np
 from backend.documents.limit_volumes import volumes_document
 from backend.gauge.features import Ceiling, KeepIn
 from backend.gauge.rules import Rules, volumes_of
-from backend.site.bodies import SiteBodies
+from backend.site.named_bodies import SiteBodies
 
 SQUARE = np.array([[0.0, 0.0], [10.0, 0.0], [10.0, 8.0], [0.0, 8.0]])
 

@@ -13,7 +13,7 @@ from backend.gauge.rules import Rules, volumes_of
 from backend.pipeline.config import Config
 from backend.pipeline.exact import Cells, own_image
 from backend.pipeline.surroundings import surroundings_of
-from backend.site.bodies import SiteBodies
+from backend.site.named_bodies import SiteBodies
 from backend.spatial.boxes import concatenated
 
 __all__ = ["config", "inputs"]

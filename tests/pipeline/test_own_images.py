@@ -22,7 +22,7 @@ from backend.pipeline.whatif import what_if
 from backend.pipeline.zones import zone_image
 from backend.shell.app.image_frames import exact_frame, frame_of, rings, zone_frame
 from backend.shell.app.wire import decode
-from backend.site.bodies import SiteBodies
+from backend.site.named_bodies import SiteBodies
 from backend.spatial import transform
 from backend.spatial.boxes import Boxes
 

@@ -20,7 +20,7 @@ from backend.safety import site, words
 from backend.safety.approach import Motion, approach_standing, standing_reach
 from backend.safety.partner import Limits
 from backend.safety.record import Concern, Level
-from backend.site.bodies import SiteBodies
+from backend.site.named_bodies import SiteBodies
 from backend.spatial import rotation, transform
 from backend.spatial.boxes import Boxes
 

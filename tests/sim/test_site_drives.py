@@ -11,7 +11,7 @@ from backend.control.patterns import Sticks
 from backend.shell.sim.careless import SETTLE
 from backend.shell.sim.drives import Drive, drive, twin
 from backend.shell.sim.dynamics import SimState
-from backend.site.bodies import SiteBodies
+from backend.site.named_bodies import SiteBodies
 from backend.spatial import rotation
 from backend.spatial.boxes import Boxes
 

@@ -11,8 +11,9 @@ from backend.errors import InputError
 from backend.gauge.features import OverheadRule, Pole, Track, TrackRule
 from backend.gauge.rules import Rules
 from backend.gauge.volumes import LimitVolume
-from backend.site.bodies import SiteBodies, site_bodies
+from backend.site.bodies import site_bodies
 from backend.site.gauge import site_features, site_options, site_rules, site_volumes
+from backend.site.named_bodies import SiteBodies
 from backend.site.site import load_site
 
 HEAD = """
@@ -100,6 +101,8 @@ height = 16.0
 def site_file(tmp_path: Path) -> Path:
     path = tmp_path / "yard.toml"
     path.write_text(HEAD + GAUGE, encoding="utf-8")
+    empty = '<LandXML xmlns="http://www.landxml.org/schema/LandXML-1.2" version="1.2"></LandXML>'
+    (tmp_path / "station.xml").write_text(empty, encoding="utf-8")
     return path
 
 

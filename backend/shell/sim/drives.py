@@ -36,7 +36,7 @@ from backend.shell.sim.careless import SETTLE, Careless, Hands, bodies_of, faste
 from backend.shell.sim.dynamics import Demand, Hydraulics, SimState
 from backend.shell.sim.radio import OnAir, Radio, receive, send
 from backend.shell.sim.sensors import Sensor, sensors
-from backend.site.bodies import NO_SITE_BODIES, SiteBodies
+from backend.site.named_bodies import NO_SITE_BODIES, SiteBodies
 from backend.site.site import Site, load_site
 
 DT = 0.01  # of the simulated machines [s]
