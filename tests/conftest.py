@@ -19,9 +19,11 @@ __all__ = ["watch"]
 ROOT = Path(__file__).resolve().parents[1]
 SHARED = ROOT.parent / "shared" / "data"
 
-# How long an example takes is no property of the code.
-settings.register_profile("cockpit", deadline=None)
-settings.load_profile("cockpit")
+# How long an example takes is no property of the code. The same examples every time, so that a
+# change is judged by what it changes; HYPOTHESIS_PROFILE=random looks for new ones.
+settings.register_profile("cockpit", deadline=None, derandomize=True)
+settings.register_profile("random", deadline=None)
+settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "cockpit"))
 
 # Before any program under test starts: none may record into the home of who runs the tests.
 RECORDINGS = tempfile.mkdtemp(prefix="cockpit-recordings-")
