@@ -86,7 +86,8 @@ class Operator:
     def drive(self, machine: str, going: Callable[[], bool], **levers: float) -> None:
         """Takes a machine and moves levers until `going`.
 
-        A busy computer may pause it on the way, or let the lease end: then once more.
+        A busy computer may pause it on the way, let the lease end, or stop a direction for want of
+        fresh data until its stick was in neutral: then once more.
         """
         end = time.monotonic() + 60.0
         while not going():
@@ -95,6 +96,9 @@ class Operator:
                 self.take(machine)
             if self.state(machine) not in ("Enabled", "Active"):
                 self.enable(machine)
+            if self.shut(machine):
+                self.move(**dict.fromkeys(levers, 0.0))
+                time.sleep(6 * PERIOD)
             self.move(**levers)
             time.sleep(PERIOD)
 
@@ -113,6 +117,11 @@ class Operator:
 
     def state(self, machine: str) -> str:
         return str(self.console(machine).get("state", ""))
+
+    def shut(self, machine: str) -> bool:
+        """Whether a direction waits for its stick's neutral."""
+        causes = self.seat.get("decision", {}).get(machine, {}).get("causes", {})
+        return any(side["concern"] == "neutral" for both in causes.values() for side in both)
 
     def joints(self, machine: str) -> dict[str, float]:
         found: dict[str, float] = self.snapshot["machines"][machine]["joints"]

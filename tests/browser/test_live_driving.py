@@ -67,6 +67,17 @@ class Pad:
     def state(self) -> str:
         return self.eyes()[0]
 
+    def shut(self) -> list[str]:
+        """Axes of LEFT that wait for their stick's neutral."""
+        return list(
+            self.page.evaluate(
+                """() => { const {you, snapshot} = window.cockpit.state;
+                  const causes = snapshot.driving.seats[you?.seat]?.decision?.left?.causes ?? {};
+                  return Object.entries(causes).filter(([, both]) =>
+                    both.some((side) => side.concern === "neutral")).map(([role]) => role); }"""
+            )
+        )
+
     def wait(self, condition: Any, timeout: float = 120.0) -> None:
         end = time.monotonic() + timeout
         while not condition():
@@ -101,6 +112,10 @@ class Pad:
                 return
             if state not in ("Enabled", "Active"):
                 self.arm()
+            shut = self.shut()
+            if shut:  # stopped for want of fresh data on a busy computer
+                self.rest()
+                time.sleep(0.2)
             for role, value in left.items():
                 number, way = AXES[role]
                 speed = 0.0 if abs(value) < NEAR / 2 else max(min(1.5 * value, 1.0), -1.0)
