@@ -19,7 +19,8 @@ LONGEST = 256  # characters of a name or a reason
 
 class Kind(Enum):
     """REQUEST the lease; REFRESH or RELEASE one's own; HAND_OVER it to another, who then requests
-    it; TAKE_OVER from whoever holds it, by a supervisor with a reason.
+    it; TAKE_OVER from whoever holds it, by a supervisor with a reason; STOP ends anybody's lease,
+    by anybody: whoever sees danger stops what moves, also what another cockpit drives.
     """
 
     REQUEST = "request"
@@ -27,6 +28,7 @@ class Kind(Enum):
     RELEASE = "release"
     HAND_OVER = "hand_over"
     TAKE_OVER = "take_over"
+    STOP = "stop"
 
 
 @dataclass(frozen=True)
@@ -46,7 +48,8 @@ class Request:
 @dataclass(frozen=True)
 class Lease:
     """token: the newest issued, which never falls; holder: empty when nobody holds it; expires [s];
-    offered_to: whom the holder hands it to; reason: of the take-over that granted it, else empty.
+    offered_to: whom the holder hands it to; reason: of the take-over that granted it, else empty;
+    stopped_by: who ended it by a stop, until it is granted anew.
     """
 
     token: int
@@ -54,6 +57,7 @@ class Lease:
     expires: float = -math.inf
     offered_to: str = ""
     reason: str = ""
+    stopped_by: str = ""
 
     def held(self, now: float) -> bool:
         return bool(self.holder) and now < self.expires
@@ -109,7 +113,7 @@ def _cannot_request(lease: Lease, request: Request, now: float) -> str:
 
 def _not_own(lease: Lease, request: Request, now: float) -> str:
     if not lease.held(now):
-        return "the lease has ended"
+        return f"{lease.stopped_by} pressed stop" if lease.stopped_by else "the lease has ended"
     if request.token != lease.token or request.who != lease.holder:
         return f"{lease.holder} is in control"
     return ""
@@ -127,6 +131,10 @@ def _cannot_take_over(lease: Lease, request: Request, now: float) -> str:
     return "" if request.reason.strip() else "a take-over needs a reason"
 
 
+def _cannot_stop(lease: Lease, request: Request, now: float) -> str:
+    return "" if lease.held(now) else "nobody is in control"
+
+
 def _granted(lease: Lease, request: Request, now: float) -> Lease:
     reason = request.reason if request.kind is Kind.TAKE_OVER else ""
     return Lease(lease.token + 1, request.who, now + TERM, reason=reason)
@@ -140,6 +148,10 @@ def _released(lease: Lease, request: Request, now: float) -> Lease:
     return Lease(lease.token)
 
 
+def _stopped(lease: Lease, request: Request, now: float) -> Lease:
+    return Lease(lease.token, stopped_by=request.who)
+
+
 def _offered(lease: Lease, request: Request, now: float) -> Lease:
     return replace(lease, offered_to=request.to)
 
@@ -150,6 +162,7 @@ _REFUSALS = {
     Kind.RELEASE: _not_own,
     Kind.HAND_OVER: _cannot_hand_over,
     Kind.TAKE_OVER: _cannot_take_over,
+    Kind.STOP: _cannot_stop,
 }
 _DONE = {
     Kind.REQUEST: _granted,
@@ -157,6 +170,7 @@ _DONE = {
     Kind.RELEASE: _released,
     Kind.HAND_OVER: _offered,
     Kind.TAKE_OVER: _granted,
+    Kind.STOP: _stopped,
 }
 
 

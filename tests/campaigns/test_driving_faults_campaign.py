@@ -85,8 +85,13 @@ def lever(operator: Operator) -> float:
 
 
 def moving(operator: Operator, tap: Wiretap) -> None:
+    """Until a command of from now on moves the machine, whatever was last said before."""
+    begun = time.monotonic()
+
     def going() -> bool:
-        return bool(tap.commands) and bool(tap.commands[-1].velocity.any())
+        newest = tap.commands[-1] if tap.commands else None
+        commanded = newest is not None and newest.arrival > begun and bool(newest.velocity.any())
+        return commanded and tap.statuses[-1].mode == "remote" and tap.speed() > 0.05
 
     operator.move(enable=False, right_y=0.0)
     operator.drive("left", going, right_y=lever(operator))

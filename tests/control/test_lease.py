@@ -96,6 +96,17 @@ def test_release_frees_at_once() -> None:
     granted(lease, 0.1, "bob")
 
 
+def test_a_stop_by_anybody_ends_the_lease_and_says_who_until_it_is_granted_anew() -> None:
+    assert "nobody" in refused(fresh(), 0.0, "vic", Kind.STOP)
+    lease, token = granted(fresh(), 0.0)
+    lease, answer = ask(lease, request(Kind.STOP, "vic", role="viewer"), 0.1)
+    assert (answer.granted, answer.token, answer.holder) == (True, 0, "")
+    assert not lease.admits(token, 0.1)
+    assert refused(lease, 0.2, "ann", Kind.REFRESH, token=token) == "vic pressed stop"
+    lease, again = granted(lease, 0.3)
+    assert (again, lease.stopped_by) == (token + 1, "")
+
+
 @pytest.mark.parametrize("who", ["", "  ", "x" * (LONGEST + 1)])
 def test_nobody_holds_no_lease(who: str) -> None:
     assert refused(fresh(), 0.0, who)

@@ -219,6 +219,40 @@ def test_stop_by_a_viewer_latches_for_every_later_seat(cockpit: Cockpit) -> None
     assert cockpit.console(again)["state"] == "Idle"
 
 
+def test_stop_reaches_a_machine_that_another_cockpit_drives() -> None:
+    here, there = Cockpit(), Cockpit()
+    there.radio = here.radio
+    there.driving = Driving(
+        {"left": MINI},
+        {"left": there.outlet},  # type: ignore[dict-item]
+        Leases(here.radio.ask, here.radio.clock),
+        dict,
+        clock=here.radio.clock,
+    )
+    status = SimpleNamespace(holder="ann")
+    here.driving = Driving(
+        {"left": MINI},
+        {"left": here.outlet},  # type: ignore[dict-item]
+        Leases(here.radio.ask, here.radio.clock),
+        lambda: {"left": status},  # type: ignore[dict-item,return-value]
+        lambda *event: here.events.append(event),
+        here.radio.clock,
+    )
+    driving = there.sit()
+    there.drive(driving)
+    assert there.swing() < 0.0
+    here.say(here.sit(VIEWER, "vic"), "stop")
+    sent = len(there.outlet.sent)
+    there.run(30)
+    assert not here.radio.lease.held(here.radio.now)
+    assert there.console(driving)["refused"] == "vic pressed stop"
+    assert not there.console(driving)["held"]
+    assert all(not s[0].joints.any() for s in there.outlet.sent[sent + 30 :])
+    assert [(who, d["machines"]) for kind, who, d in here.events if kind == "stop"] == [
+        ("vic", ["left"])
+    ]
+
+
 def test_a_viewer_moves_nothing_and_fills_no_log(cockpit: Cockpit) -> None:
     looking = cockpit.sit(VIEWER, "vic")
     cockpit.drive(looking)

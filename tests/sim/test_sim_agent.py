@@ -108,6 +108,20 @@ def test_it_rejoins_the_schedule_smoothly():
     assert run.worst_jump <= LIMITS.acceleration.max() * DT + 1e-9
 
 
+def test_after_a_stop_it_stands_until_it_was_leased_again():
+    run = Run(LEFT).until(3.0).until(4.0, steady(0.4))
+    gate, answer = negotiate(run.agent.gate, Request(Kind.STOP, "vic", "viewer"), run.t)
+    assert answer.granted
+    run.agent = replace(run.agent, gate=gate)
+    run.until(4.5)
+    here = run.state.q.copy()
+    run.until(30.0)
+    assert run.agent.mode is Mode.STOPPED
+    np.testing.assert_allclose(run.state.q, here, atol=5e-3)
+    run.until(31.0, steady(0.4)).until(100.0)
+    assert run.agent.mode is Mode.PROGRAM
+
+
 def test_it_rejoins_after_whole_turns():
     """Swung around twice, the machine does not unwind: it finds the nearest turn."""
     run = Run(LEFT).until(1.0).until(16.0, steady(0.9))

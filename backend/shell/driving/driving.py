@@ -112,7 +112,7 @@ class Driving:
         if said is None or seat is None:
             return True
         if isinstance(said, pages.StopSaid):  # by anybody who is signed in
-            self._stop(seat)
+            self._stop(name, seat)
         elif not seat.person.may_drive:
             self._refuse(name, seat, message["type"])
         elif isinstance(said, pages.LeaseSaid):
@@ -228,15 +228,28 @@ class Driving:
         if self._clock() - self._cycled <= FAILED:
             self._leases.refresh()
 
-    def _stop(self, by: Seat) -> None:
-        """Latches every seat that holds a machine: whoever sees danger stops what moves."""
+    def _stop(self, name: str, by: Seat) -> None:
+        """Latches every seat that holds a machine: whoever sees danger stops what moves.
+
+        What another cockpit drives is stopped by its agent, which ends the lease.
+        """
         held = self._leases.all()
+        elsewhere = sorted(
+            machine
+            for machine, status in self._statuses().items()
+            if machine in self._machines and status.holder and machine not in held
+        )
+        for machine in elsewhere:
+            self._leases.stop(machine, name, by.person)
+        if elsewhere:
+            details = {"role": by.person.role, "machines": elsewhere, "elsewhere": True}
+            self._event("stop", by.person.who, details)
         with self._lock:
             news = held.keys() - self._stopped.keys()
             self._stopped |= dict.fromkeys(held, f"{by.person.who} pressed stop")
-            for name in {lease.seat for lease in held.values()} & set(self._seats):
-                seat = self._seats[name]
-                self._seats[name] = replace(seat, buttons=replace(seat.buttons, stop=True))
+            for holder in {lease.seat for lease in held.values()} & set(self._seats):
+                seat = self._seats[holder]
+                self._seats[holder] = replace(seat, buttons=replace(seat.buttons, stop=True))
         if news:  # pressed again and again it is one stop
             details = {"role": by.person.role, "machines": sorted(news)}
             self._event("stop", by.person.who, details)

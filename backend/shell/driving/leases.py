@@ -96,6 +96,11 @@ class Leases:
             request = Request(Kind.REFRESH, held.who, token=held.token)
             self._ask(name, request, self._refreshed(name, held.seat, request, now))
 
+    def stop(self, machine: str, seat: str, person: Person) -> None:
+        """Ends the lease that somebody elsewhere holds."""
+        request = Request(Kind.STOP, person.who, person.role)
+        self._ask(machine, request, lambda answer: self._told(machine, seat, request, answer))
+
     def drop(self, seat: str) -> None:
         """Gives back everything that a seat holds; for a page that is gone."""
         with self._lock:

@@ -1,6 +1,7 @@
 """A simulated machine's agent: it obeys through the gate of every agent, and has a program.
 
-Between commands it stands; some time after the last one it finds back to its program.
+Between commands it stands; some time after the last one it finds back to its program, but not
+after somebody pressed stop: then only when the machine was leased again.
 """
 
 from __future__ import annotations
@@ -84,7 +85,8 @@ def act(
         return replace(agent, mode=Mode.REMOTE, rejoin=None, asked=asked), state, asked
     if agent.mode is Mode.REMOTE:
         agent = replace(agent, mode=Mode.STOPPED, asked=None)
-    if agent.mode is Mode.STOPPED and now - gate.heard_at >= RESUME_AFTER:
+    rested = now - gate.heard_at >= RESUME_AFTER and not gate.lease.stopped_by
+    if agent.mode is Mode.STOPPED and rested:
         has_program = bool(program.script or program.cycle)
         agent = replace(agent, mode=Mode.REJOINING if has_program else Mode.HOLD)
     if agent.mode in (Mode.STOPPED, Mode.HOLD):
