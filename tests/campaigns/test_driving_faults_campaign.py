@@ -6,21 +6,18 @@ Prints the expected and the measured figures. `FAULTS=10 pytest ...` makes a ten
 
 from __future__ import annotations
 
-import contextlib
 import itertools
-import os
 import signal
 import socket
-import statistics
 import threading
 import time
-import urllib.request
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from live import Backend, all_valid, end, serve, start
+from faults import SITE, TIMES, machines, moving, show, spread
+from live import Backend, all_valid, serve
 from operators import Operator
 from wiretap import Wiretap
 
@@ -28,30 +25,6 @@ from backend.shell.link.encode import encode_command
 from backend.shell.link.session import with_port
 
 pytestmark = pytest.mark.timeout(7_200)
-SITE = "demo"
-TIMES = int(os.environ.get("FAULTS", "100"))
-
-
-def show(what: str, expected: str, measured: str) -> None:
-    print(f"  {what:44} expected {expected:22} measured {measured}", flush=True)
-
-
-def spread(seconds: list[float]) -> str:
-    """In milliseconds."""
-    ordered = sorted(seconds)
-    p99 = ordered[min(len(ordered) - 1, int(0.99 * len(ordered)))]
-    middle = statistics.median(ordered)
-    return f"p50 {1e3 * middle:.0f}, p99 {1e3 * p99:.0f}, max {1e3 * ordered[-1]:.0f} ms"
-
-
-@contextlib.contextmanager
-def machines(*endpoints: str) -> Iterator[None]:
-    """Both simulated machines, connected to every endpoint."""
-    connected = [word for endpoint in endpoints for word in ("--connect", endpoint)]
-    with contextlib.ExitStack() as running:
-        for name in ("left", "right"):
-            running.callback(end, start("sim", "--site", SITE, "--machine", name, *connected))
-        yield
 
 
 @pytest.fixture(scope="module")
@@ -77,24 +50,6 @@ def operator(station: Backend) -> Iterator[Operator]:
     opened.take("left")
     yield opened
     opened.close()
-
-
-def lever(operator: Operator) -> float:
-    """Of the boom: towards the middle of its travel, so that it never ends."""
-    return 0.4 if operator.joints("left")["boom"] > 0.6 else -0.4
-
-
-def moving(operator: Operator, tap: Wiretap) -> None:
-    """Until a command of from now on moves the machine, whatever was last said before."""
-    begun = time.monotonic()
-
-    def going() -> bool:
-        newest = tap.commands[-1] if tap.commands else None
-        commanded = newest is not None and newest.arrival > begun and bool(newest.velocity.any())
-        return commanded and tap.statuses[-1].mode == "remote" and tap.speed() > 0.05
-
-    operator.move(enable=False, right_y=0.0)
-    operator.drive("left", going, right_y=lever(operator))
 
 
 def zero_after(operator: Operator, tap: Wiretap, begun: float) -> float:
@@ -270,36 +225,3 @@ def test_a_client_that_reads_slowly(station: Backend, operator: Operator) -> Non
     show("others' p99 beside one that reads 1 kB/s", "< +10 %", f"{change:+.0f} %")
     show("memory beside it", "< +50 MB", f"{more:+.1f} MB")
     assert more < 50.0
-
-
-def test_kills_of_the_backend() -> None:
-    endpoint, beside = (with_port("tcp/127.0.0.1:0") for _ in range(2))
-    stops, backs, rearmed = [], [], 0
-    with Wiretap(beside, "left", listens=True) as tap, machines(endpoint, beside):
-        for k in range(TIMES):
-            begun = time.monotonic()
-            with serve(SITE, "--no-record", endpoint=endpoint) as station:
-                if k:
-                    with urllib.request.urlopen(station.url, timeout=10) as answer:
-                        assert answer.status == 200
-                    backs.append(time.monotonic() - begun)
-                station.wait_for(all_valid)
-                operator = Operator(station)
-                rearmed += operator.machine("left")["holder"] != ""
-                rearmed += tap.speed() > 0.02 and tap.statuses[-1].mode == "remote"
-                operator.drive("left", lambda: tap.speed() > 0.05, right_y=lever(operator))
-                time.sleep(0.2)
-                killed = time.monotonic()
-                station.process.send_signal(signal.SIGKILL)
-                operator.close()
-                while tap.stood(killed) is None:
-                    assert time.monotonic() - killed < 5.0, "the machine goes on"
-                    time.sleep(0.005)
-                stops.append(tap.stood(killed) - killed)
-                print(f"  kill {k}: stood after {1e3 * stops[-1]:.0f} ms", flush=True)
-    show(f"{TIMES} kills of the backend → standstill", "<= 500 ms", spread(stops))
-    show("page back", "<= 5 s", spread(backs))
-    show("armed by itself", "0", str(rearmed))
-    assert max(stops) <= 0.5
-    assert max(backs) <= 5.0
-    assert rearmed == 0

@@ -36,10 +36,15 @@ def tap(station: Backend) -> Iterator[Wiretap]:
 
 
 def moving(operator: Operator, tap: Wiretap, **levers: float) -> None:
-    """Until the machine does what the levers say."""
+    """Until the machine does what the levers say, and not what its own program does."""
+
+    def goes() -> bool:
+        remote = bool(tap.statuses) and tap.statuses[-1].mode == "remote"
+        return remote and tap.truths != [] and tap.speed() > 0.05
+
     # Up with the boom first, and away from the partner: free whatever the other machine does.
     going = levers or {"right_y": -0.5}
-    operator.drive("left", lambda: tap.truths != [] and tap.speed() > 0.05, **going)
+    operator.drive("left", goes, **going)
 
 
 def test_sticks_move_the_machine_and_the_other_goes_on(operator: Operator, tap: Wiretap) -> None:
