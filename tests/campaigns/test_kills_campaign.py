@@ -21,11 +21,12 @@ from backend.shell.link.session import with_port
 @pytest.mark.timeout(7_200)
 def test_kills_of_the_backend() -> None:
     endpoint, beside = (with_port("tcp/127.0.0.1:0") for _ in range(2))
+    heard = "--no-record", "--connect", beside  # the tap hears commands, too
     stops, backs, rearmed = [], [], 0
     with Wiretap(beside, "left", listens=True) as tap, machines(endpoint, beside):
         for k in range(TIMES):
             begun = time.monotonic()
-            with serve(SITE, "--no-record", endpoint=endpoint) as station:
+            with serve(SITE, *heard, endpoint=endpoint) as station:
                 if k:
                     with urllib.request.urlopen(station.url, timeout=10) as answer:
                         assert answer.status == 200
