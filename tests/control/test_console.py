@@ -55,6 +55,13 @@ def test_what_is_lost_stops_at_once_and_needs_a_new_press(lost: str) -> None:
     assert run(CALM, HELD, start=stopped).state is State.ENABLED
 
 
+def test_the_pause_button_interrupts_and_needs_a_new_press() -> None:
+    paused = run(replace(MOVED, pause=True), start=ACTIVE)
+    assert (paused.state, paused.why) == (State.PAUSE, "paused")
+    assert not run(MOVED, HELD, start=paused).may_move
+    assert run(CALM, HELD, start=paused).state is State.ENABLED
+
+
 def test_the_lease_lost_is_reserved_and_comes_back_idle() -> None:
     stopped = run(replace(MOVED, lease=False), start=ACTIVE)
     assert stopped.state is State.RESERVED
