@@ -40,6 +40,34 @@ def place(
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _spin(axis: Array, sine: float, versine: float, c: Array, R: Array) -> None:
+    """Turn center c (3,) and rotation R (3, 3) about an axis (2, 3), origin and unit vector, in
+    place; versine is 1 - cos of the angle.
+    """
+    o, u = axis[0], axis[1]
+    x, y, z = c[0] - o[0], c[1] - o[1], c[2] - o[2]
+    # v + sin (u x v) + (1 - cos) (u (u . v) - v)
+    along = u[0] * x + u[1] * y + u[2] * z
+    c[0] = o[0] + x + sine * (u[1] * z - u[2] * y) + versine * (u[0] * along - x)
+    c[1] = o[1] + y + sine * (u[2] * x - u[0] * z) + versine * (u[1] * along - y)
+    c[2] = o[2] + z + sine * (u[0] * y - u[1] * x) + versine * (u[2] * along - z)
+    for b in range(3):
+        x, y, z = R[0, b], R[1, b], R[2, b]
+        along = u[0] * x + u[1] * y + u[2] * z
+        R[0, b] = x + sine * (u[1] * z - u[2] * y) + versine * (u[0] * along - x)
+        R[1, b] = y + sine * (u[2] * x - u[0] * z) + versine * (u[1] * along - y)
+        R[2, b] = z + sine * (u[0] * y - u[1] * x) + versine * (u[2] * along - z)
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _copy(c: Array, R: Array, to_c: Array, to_R: Array) -> None:
+    for x in range(3):
+        to_c[x] = c[x]
+        for y in range(3):
+            to_R[x, y] = R[x, y]
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _placed(own: tuple[Array, Array, Array], links: IntArray, T: Array) -> tuple[Array, Array]:
     """Centers (n, 3) and rotations (n, 3, 3) of all bodies in the root frame."""
     n = len(links)
@@ -169,6 +197,7 @@ def advance(
     chosen, safe = np.empty(len(apart), np.int64), np.empty(len(apart))
     ca, cb2 = np.empty(3), np.empty(3)
     Ra, Rb2 = np.empty((3, 3)), np.empty((3, 3))
+    posture = np.empty(joints)
     for k in range(len(ends)):
         if ends[k] <= 0.0:
             continue
@@ -199,24 +228,40 @@ def advance(
             rate = itself_rates[k, c] if c < p else rates[k, i]
             less = wrong[c] if c < p else eta
             g = apart[c]
+            if c < p:
+                hb, rb = own[2][j], radius[j]
+                _copy(centers[j], rotations[j], cb2, Rb2)
+            else:
+                hb, rb = others[2][j], other_radius[j]
+                _copy(others[0][j], others[1][j], cb2, Rb2)
             while s < free[k]:
                 if s > 0.0:
-                    ca[:], Ra[:] = own[0][i], own[1][i]
-                    posture = q + s * directions[k]
-                    place(chain[0], chain[1], chain[2], posture, links[i], ca, Ra)
-                    if c < p:
-                        cb2[:], Rb2[:] = own[0][j], own[1][j]
-                        place(chain[0], chain[1], chain[2], posture, links[j], cb2, Rb2)
-                        hb = own[2][j]
-                        rb = radius[j]
+                    if single >= 0:
+                        angle = s * directions[k, single]
+                        sine, versine = math.sin(angle), 1.0 - math.cos(angle)
+                        _copy(centers[i], rotations[i], ca, Ra)
+                        if carried[i, single]:
+                            _spin(axes[single], sine, versine, ca, Ra)
+                        if c < p and carried[j, single]:
+                            _copy(centers[j], rotations[j], cb2, Rb2)
+                            _spin(axes[single], sine, versine, cb2, Rb2)
                     else:
-                        cb2[:], Rb2[:] = others[0][j], others[1][j]
-                        hb = others[2][j]
-                        rb = other_radius[j]
-                    d = math.sqrt(((ca - cb2) ** 2).sum())
+                        for x in range(joints):
+                            posture[x] = q[x] + s * directions[k, x]
+                        _copy(own[0][i], own[1][i], ca, Ra)
+                        place(chain[0], chain[1], chain[2], posture, links[i], ca, Ra)
+                        if c < p:
+                            _copy(own[0][j], own[1][j], cb2, Rb2)
+                            place(chain[0], chain[1], chain[2], posture, links[j], cb2, Rb2)
+                    d = 0.0
+                    for x in range(3):
+                        d += (ca[x] - cb2[x]) ** 2
+                    d = math.sqrt(d)
                     g = d - radius[i] - rb
                     if g < 0.3 * d:
-                        g = max(g, gap(ca, Ra, own[2][i], cb2, Rb2, hb, math.inf))
+                        # A gap that carries to the end needs no better bound.
+                        enough = less + rate * (free[k] - s) + CLOSE
+                        g = max(g, gap(ca, Ra, own[2][i], cb2, Rb2, hb, enough))
                         if 0.0 < g < less + CLOSE and less > 0.0:
                             g = pair_distance(ca, Ra, own[2][i], cb2, Rb2, hb, points)
                     g -= less
