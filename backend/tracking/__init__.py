@@ -1,0 +1,1 @@
+"""From detections to tracks of people and objects, and where they will be."""
