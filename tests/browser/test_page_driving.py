@@ -10,7 +10,18 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from driving_frames import CAUSE, ZERO, DriveFeed, console, decision, limited, method, remote, seat
+from driving_frames import (
+    CAUSE,
+    JOINTS,
+    ZERO,
+    DriveFeed,
+    console,
+    decision,
+    limited,
+    method,
+    remote,
+    seat,
+)
 from playwright.sync_api import Browser
 from test_page_exact import CLIPPED, OUTSIDE, ExactFeed
 from test_page_recording import ON
@@ -752,7 +763,11 @@ def situations(feed: DriveFeed) -> dict[str, Any]:
     """Name -> what the server says then."""
 
     def idle() -> None:
+        slow = "{} at full speed needs 4.36 m to stop and enters the limit: p_u = 0.80 m and p_l = "
+        slow += "0.20 m leave 0.60 m; p_u must be at least 4.56 m."
+        told = method(warnings=[slow.format(joint) for joint in JOINTS[:3]])
         feed.still()
+        feed.seat = {**feed.seat, "decision": {"left": {**decision(), "method": told}}}
 
     def pause() -> None:
         feed.still("Pause", why="dead-man released")
@@ -762,7 +777,8 @@ def situations(feed: DriveFeed) -> dict[str, Any]:
         feed.seat = {**feed.seat, "sticks": {**ZERO, "left_x": -0.7, "track_left": 0.5}}
 
     def limit() -> None:
-        feed.seat = {**feed.seat, "decision": {"left": limited(0.4, 0.0)}}
+        told = method("constrained", scale=0.42, why=["stick to gauge:T1 0.31 m"])
+        feed.seat = {**feed.seat, "decision": {"left": {**limited(0.4, 0.0), "method": told}}}
         feed.machines["left"] = remote("anna", round_trip=0.18, level="slow")
 
     def stop() -> None:

@@ -75,7 +75,8 @@ function showMethod(mine) {
   if ($("method").disabled === still()) $("method").disabled = !still();
   const told = decision(state.own)?.method;
   const kept = told ? `p_u ${meters(told.upper)}, p_l ${meters(told.lower)}. ` : "";
-  write($("method-note"), `${kept}The limiter comes after it in any case. ${(told?.warnings ?? []).join(" ")}`.trim());
+  const lines = [`${kept}The limiter comes after it in any case.`, ...(told?.warnings ?? []).map((line) => `▲ ${line}`)];
+  write($("method-note"), lines.join("\n"));
 }
 
 /** Ten times a second. */
