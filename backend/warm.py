@@ -20,6 +20,7 @@ from backend.cspace.regions import regions
 from backend.machine.load import load_machine, shipped_machines
 from backend.machine.outline import outlines_of
 from backend.pipeline.place import place
+from backend.planning.live import rehearse
 from backend.safety.approach import Motion, approach
 from backend.safety.limiter import Wish, limit, open_latch
 from backend.safety.limits import Delay
@@ -49,6 +50,7 @@ def compile_kernels() -> None:
     )
     wish = Wish(machine.max_velocity, np.ones(2))
     limit("own", machine, q, wish, (concern,), Delay(0.1, 0.2), open_latch(machine), 0.0)
+    rehearse(machine)
     layers = {"partner": near}
     joint4(machine, layers, (3, 3, 3, 3))
     free = certified4(machine, layers, 0.1, (3, 3, 3, 3)).certified_free()

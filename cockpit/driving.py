@@ -10,6 +10,7 @@ from backend.control.lease import TERM, Answer, Request
 from backend.pipeline.config import Config
 from backend.shell.driving.driving import Driving, Event
 from backend.shell.driving.leases import Leases
+from backend.shell.driving.methods import Methods
 from backend.shell.driving.outlet import Outlet
 from backend.shell.link.asking import ask
 from backend.shell.link.codec import DecodeError
@@ -44,4 +45,4 @@ def make_driving(
         ask(session, "lease", prefixes[name], encode_request(request), on_answer, on_end, TERM)
 
     leases = Leases(asking, time.monotonic)
-    return Driving(machines, outlets, leases, receiver.statuses, event)
+    return Driving(machines, outlets, leases, receiver.statuses, Methods(config), event)

@@ -48,8 +48,8 @@ ROOMS: dict[str, set[str]] = {
     },
     "backend.shell": {"backend"},
     "backend.warm": {
-        *("backend.pipeline", "backend.cspace", "backend.collision", "backend.machine"),
-        *("backend.safety", "backend.spatial"),
+        *("backend.pipeline", "backend.planning", "backend.cspace", "backend.collision"),
+        *("backend.machine", "backend.safety", "backend.spatial"),
     },
     "cockpit": {"backend", "cockpit"},
 }

@@ -27,6 +27,15 @@ class Pattern(Enum):
     SAE = "SAE"
 
 
+class Method(Enum):
+    """What shapes the wish before the limiter: nothing, or one of Mäkinen's ways in `planning`."""
+
+    BRAKING = "braking"
+    SCALING = "scaling"
+    POTENTIAL = "potential"
+    CONSTRAINED = "constrained"
+
+
 @dataclass(frozen=True)
 class Sticks:
     """Deflections in -1..1: x to the right, y forwards; pedals: of the left and right track."""
@@ -41,10 +50,11 @@ class Sticks:
 
 @dataclass(frozen=True)
 class Setting:
-    """How the sticks are read. fine: at `FINE` of full speed."""
+    """How the sticks are read. fine: at `FINE` of full speed; method: near limits."""
 
     pattern: Pattern = Pattern.ISO
     fine: bool = False
+    method: Method = Method.BRAKING
 
 
 def deflection(value: float) -> float:
@@ -63,6 +73,11 @@ def neutral(sticks: Sticks) -> bool:
 def with_pattern(setting: Setting, pattern: Pattern, sticks: Sticks) -> Setting:
     """The setting after the operator chose a pattern: only in neutral, else unchanged."""
     return replace(setting, pattern=pattern) if neutral(sticks) else setting
+
+
+def with_method(setting: Setting, method: Method, sticks: Sticks) -> Setting:
+    """The setting after the operator chose a method: only in neutral, else unchanged."""
+    return replace(setting, method=method) if neutral(sticks) else setting
 
 
 def velocities(machine: Machine, sticks: Sticks, setting: Setting) -> tuple[Array, Array]:

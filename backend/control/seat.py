@@ -14,7 +14,16 @@ import numpy as np
 
 from backend.control.console import Console, Event, State
 from backend.control.desk import Desk, advance_all, choose
-from backend.control.patterns import Pattern, Setting, Sticks, neutral, velocities, with_pattern
+from backend.control.patterns import (
+    Method,
+    Pattern,
+    Setting,
+    Sticks,
+    neutral,
+    velocities,
+    with_method,
+    with_pattern,
+)
 from backend.control.person import Person
 from backend.machine.model import Machine
 from backend.safety.limiter import Override, Wish
@@ -62,10 +71,14 @@ def said(seat: Seat, new: Input) -> Seat:
     return replace(seat, input=new) if new.sequence > seat.input.sequence else seat
 
 
-def set_up(seat: Seat, pattern: Pattern, fine: bool) -> Seat:
-    """The seat after the operator chose a pattern (only in neutral) and a speed."""
-    setting = with_pattern(replace(seat.setting, fine=fine), pattern, seat.input.sticks)
-    return replace(seat, setting=setting)
+def set_up(seat: Seat, pattern: Pattern, fine: bool, method: Method | None = None) -> Seat:
+    """The seat after the operator chose a pattern and a method (both only in neutral) and a speed.
+
+    method: None for the one that it has.
+    """
+    sticks = seat.input.sticks
+    setting = with_pattern(replace(seat.setting, fine=fine), pattern, sticks)
+    return replace(seat, setting=with_method(setting, method or setting.method, sticks))
 
 
 def drives(seat: Seat, machine: str, now: float) -> Seat:

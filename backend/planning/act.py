@@ -26,21 +26,25 @@ def act(
     state: State,
     dt: float,
     settings: Settings | None = None,
+    bounds: tuple[Array, Array] | None = None,
 ) -> Action:
     """Joint rates (n,) [rad/s] for the next dt [s], and in words what limited them.
 
     q: (n,) [rad]; near: the pairs within `sight`. The same pairs
     serve all methods: A and C take corners as well, B picks the closest pair of each part.
+    bounds: lowest and highest rates (n,) [rad/s] in the place of the machine's own, where its ends
+    and accelerations are kept by somebody else afterwards: as that may slow any joint, C then
+    relies on none that moves away to make up for one that approaches.
     """
     settings = settings or Settings()
     T = posed(machine, q, state.T_site_root)
-    low, high = rate_bounds(machine, q, state.rates, dt, settings.accelerations)
+    low, high = bounds or rate_bounds(machine, q, state.rates, dt, settings.accelerations)
     if method == "scaling":
         return _scaled(machine, q, wish, near, state, dt, settings, T, low, high)
     if method == "potential":
         return _repelled(machine, wish, near, settings, T, low, high)
     if method == "constrained":
-        return _constrained(machine, wish, near, settings, T, low, high)
+        return _constrained(machine, wish, near, settings, T, low, high, bounds is not None)
     raise InputError(
         f"method '{method}' is not known; allowed are scaling, potential, constrained."
     )
@@ -53,11 +57,13 @@ def sight(
     settings: Settings,
     state: State,
     dt: float,
+    most: Array | None = None,
 ) -> Sight:
     """How near pairs must be to be told to `act`: p_u; for C all that could be damped.
 
     No distance shrinks faster than the joints' speeds, the highest that they can have after dt,
-    times the levers of the bodies' farthest points. T_site_links: (L, 4, 4).
+    times the levers of the bodies' farthest points. T_site_links: (L, 4, 4); most: (n,) speeds
+    that `act` is given as bounds [rad/s], None where it is given none.
     """
     if method != "constrained":
         return Sight.everywhere(machine, settings.thresholds.upper)
@@ -68,7 +74,7 @@ def sight(
     r = boxes.centers[:, None] - T[None, :, :3, 3]
     along = np.einsum("bjx,jx->bj", r, z)
     lever = np.sqrt(np.maximum((r**2).sum(axis=2) - along**2, 0.0)) + radius[:, None]
-    fastest = machine.max_velocity
+    fastest = machine.max_velocity if most is None else most
     if settings.accelerations:
         fastest = np.minimum(fastest, np.abs(state.rates) + machine.max_acceleration * dt)
     speed = lever * machine.body_joints * fastest
@@ -105,7 +111,7 @@ def _scaled(
     scale = velocity_scaling.scale_task if wish.rates is None else velocity_scaling.scale_joints
     found = scale(machine, q, wanted, T, near, settings.thresholds, dt, state.T_site_root)
     rates = np.clip(wanted * found.factors, low, high)
-    return Action(rates, float(found.factors.min()), _why(machine, near, found.binding))
+    return _told(rates, float(found.factors.min()), machine, near, found.binding)
 
 
 def _repelled(
@@ -131,7 +137,7 @@ def _repelled(
     )
     rates = np.clip(wanted + away, low, high)
     pushing = points[near.distance[points] < settings.thresholds.upper]
-    return Action(rates, 1.0, _why(machine, near, pushing))
+    return _told(rates, 1.0, machine, near, pushing)
 
 
 def _constrained(
@@ -142,6 +148,7 @@ def _constrained(
     T: Array,
     low: Array,
     high: Array,
+    alone: bool,
 ) -> Action:
     wanted = task_rates(machine, T, wish, settings.damping)
     if wish.rates is not None:
@@ -150,10 +157,13 @@ def _constrained(
         J = tool_jacobian_at(machine, T)
         H, g = constrained.nearest_by_tool(wanted, J, settings.damping)
     parting = constrained.damper_bounds(near.distance, settings, _rate(machine, settings))
-    found = constrained.constrain(H, g, gradients(machine, T, near), parting, low, high)
+    gradient = gradients(machine, T, near)
+    if alone:
+        gradient = constrained.approaching(gradient, low, high)
+    found = constrained.constrain(H, g, gradient, parting, low, high)
     moved = float(np.abs(wanted).max())
     scale = 1.0 if moved == 0.0 else min(1.0, float(np.abs(found.rates).max()) / moved)
-    return Action(found.rates, scale, _why(machine, near, found.binding))
+    return _told(found.rates, scale, machine, near, found.binding)
 
 
 def _rate(machine: Machine, settings: Settings) -> float:
@@ -164,7 +174,14 @@ def _slowed(rates: Array, most: Array) -> Array:
     return np.asarray(rates / max(1.0, float((np.abs(rates) / most).max())))
 
 
-def _why(machine: Machine, near: Proximities, index: IntArray) -> tuple[str, ...]:
+def _told(
+    rates: Array, scale: float, machine: Machine, near: Proximities, index: IntArray
+) -> Action:
     order = index[np.argsort(near.distance[index], kind="stable")]
+    return Action(rates, scale, reasons(machine, near, order), order)
+
+
+def reasons(machine: Machine, near: Proximities, order: IntArray) -> tuple[str, ...]:
+    """The first of the pairs `order` in words, each once."""
     words = dict.fromkeys(near.words(machine, int(k)) for k in order[:8])
     return tuple(words)[:_REASONS]

@@ -48,6 +48,14 @@ def damper_bounds(distance: Array, settings: Settings, rate: float) -> Array:
     return np.minimum(-rate * (distance - settings.thresholds.lower), settings.retreat)
 
 
+def approaching(gradient: Array, low: Array, high: Array) -> Array:
+    """(k, n) the gradient without the joints that only part within their bounds, low <= 0 <= high.
+
+    Rates that keep such rows keep them at any share of each joint as well.
+    """
+    return np.where(np.minimum(gradient * low, gradient * high) < 0.0, gradient, 0.0)
+
+
 def constrain(
     H: Array, g: Array, gradient: Array, parting: Array, low: Array, high: Array
 ) -> Constrained:
@@ -55,8 +63,23 @@ def constrain(
 
     gradient: (k, n) [m/rad]; parting: (k,) [m/s]; low, high: (n,) [rad/s]. Outside of d_s and with
     low <= 0 <= high, standing still keeps every row. Where the rows contradict each other they are
-    missed by as little as may be, the same for each, and `kept` is False.
+    missed by as little as may be, the same for each, and `kept` is False. A joint whose bounds
+    leave it one rate has it, and the others are judged beside it.
     """
+    given = low == high
+    if given.any():
+        free = ~given
+        rates = np.array(low)
+        left = parting - gradient[:, given] @ low[given]
+        if not free.any():
+            return Constrained(rates, np.zeros(0, dtype=np.int64), bool((left <= 0.0).all()))
+        rest = constrain(
+            H[np.ix_(free, free)],
+            g[free] + H[np.ix_(free, given)] @ low[given],
+            *(gradient[:, free], left, low[free], high[free]),
+        )
+        rates[free] = rest.rates
+        return rest._replace(rates=rates)
     n = len(g)
     # Rows that no admissible rates can break are left out.
     worst = np.minimum(gradient * low, gradient * high).sum(axis=1)

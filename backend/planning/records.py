@@ -9,7 +9,7 @@ import numpy as np
 
 from backend.errors import InputError
 from backend.machine.model import Machine
-from backend.spatial.types import Array
+from backend.spatial.types import Array, IntArray
 
 Method = Literal["scaling", "potential", "constrained"]
 """A: Mäkinen's linear velocity scaling; B: his potential field; C: speeds under constraints."""
@@ -80,12 +80,13 @@ class State:
 
 class Action(NamedTuple):
     """rates: (n,) [rad/s]; scale: the smallest factor by which a wish was cut, 1 where nothing was;
-    why: in words what limited, the closest first.
+    why: in words what limited, the closest first; binding: (b,) the pairs that did, in that order.
     """
 
     rates: Array
     scale: float
     why: tuple[str, ...]
+    binding: IntArray
 
 
 def damper_rate(machine: Machine) -> float:

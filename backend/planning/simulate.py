@@ -113,7 +113,7 @@ def run(
         if method is None:
             low, high = rate_bounds(machine, q, rates, dt, settings.accelerations)
             wanted = task_rates(machine, T, asked, settings.damping)
-            action = Action(np.clip(wanted, low, high), 1.0, ())
+            action = Action(np.clip(wanted, low, high), 1.0, (), np.zeros(0, dtype=np.int64))
         else:
             state = State(rates, T_site_root)
             near = near_points(

@@ -97,23 +97,25 @@ def limit(
     latch: Latch,
     now: float,
     override: Override | None = None,
+    sticks: Wish | None = None,
 ) -> Decision:
     """The command for the machine `name` at `now` [s].
 
     q: (n,) joint values [rad]; concerns: of the newest snapshot, of all machines; delay: of the
-    radio; latch: what the last call returned; override: while it is held.
+    radio; latch: what the last call returned; override: while it is held; sticks: what the sticks
+    ask for where `wish` was shaped from it: they alone say what is in neutral. None: the wish does.
     """
     n = len(machine.joints)
-    asked = np.concatenate([wish.joints, wish.tracks])
     full = full_speeds(machine)
-    asked = np.clip(np.where(np.isfinite(asked), asked, 0.0), -full, full)
+    asked = _asked(wish, full)
+    held = asked if sticks is None else _asked(sticks, full)
     locked = _locked(delay)
     own = tuple(c for c in concerns if c.machine == name)
     lift = OVERRIDE_FRACTION if override else 0.0
     found = limits(machine, own, delay, now, lift)
     fraction, causes = found.fraction.copy(), [list(pair) for pair in found.causes]
     # A stick that now points the other way has passed its neutral.
-    shut = latch.shut & np.stack([asked < 0.0, asked > 0.0], axis=1)
+    shut = latch.shut & np.stack([held < 0.0, held > 0.0], axis=1)
     if override is None:
         for k, side in np.argwhere(shut):
             fraction[k, side] = 0.0
@@ -147,6 +149,12 @@ def limit(
         override=override,
         latch=Latch(shut),
     )
+
+
+def _asked(wish: Wish, full: Array) -> Array:
+    """(m,) [rad/s, m/s]; what is not a number is nothing."""
+    asked = np.concatenate([wish.joints, wish.tracks])
+    return np.asarray(np.clip(np.where(np.isfinite(asked), asked, 0.0), -full, full))
 
 
 def _locked(delay: Delay) -> str:

@@ -35,8 +35,14 @@ def decision(**changes: Any) -> dict[str, Any]:
         "causes": none,
         "cut": {},
         "command": dict.fromkeys(JOINTS, 0.0),
+        "method": method(),
         **changes,
     }
+
+
+def method(name: str = "braking", **changes: Any) -> dict[str, Any]:
+    told = {"name": name, "upper": 0.8, "lower": 0.2, "scale": 1.0, "why": [], "warnings": []}
+    return {**told, **changes}
 
 
 def limited(swing_left: float, boom_down: float = 1.0) -> dict[str, Any]:
@@ -73,6 +79,7 @@ def seat(consoles: dict[str, Any], **changes: Any) -> dict[str, Any]:
         "driven": "left",
         "pattern": "ISO",
         "fine": False,
+        "method": "braking",
         "override": "",
         "source": "",
         "sticks": ZERO,

@@ -10,7 +10,18 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from driving_frames import CAUSE, ZERO, DriveFeed, console, limited, remote, seat
+from driving_frames import (
+    CAUSE,
+    JOINTS,
+    ZERO,
+    DriveFeed,
+    console,
+    decision,
+    limited,
+    method,
+    remote,
+    seat,
+)
 from playwright.sync_api import Browser
 from test_page_exact import CLIPPED, OUTSIDE, ExactFeed
 from test_page_recording import ON
@@ -529,13 +540,37 @@ def test_round_trips_are_a_curve_of_the_last_minute(feed: DriveFeed) -> None:
     feed.send(lambda: feed.shown("trends").get("trip") is None)
 
 
+SETTING = {"type": "setting", "pattern": "ISO", "fine": False, "method": "braking"}
+
+
+def test_the_method_is_chosen_in_neutral_and_what_it_holds_back_is_said(feed: DriveFeed) -> None:
+    page = feed.page
+    feed.send(lambda: page.inner_text("#drive-cause").startswith("All free"))
+    page.click("#controls-open")
+    page.select_option("#method", "constrained")
+    feed.send(lambda: feed.of("setting") == [{**SETTING, "method": "constrained"}])
+    feed.send(lambda: page.input_value("#method") == "braking")  # until the server says otherwise
+    why, warning = "stick to gauge:T1 0.31 m", "swing at full speed needs 3.55 m to stop"
+    told = method("constrained", scale=0.42, why=[why], warnings=[warning])
+    feed.seat = {
+        **feed.seat,
+        "method": "constrained",
+        "decision": {"left": {**decision(), "method": told}},
+    }
+    feed.send(lambda: page.input_value("#method") == "constrained")
+    assert warning in page.inner_text("#method-note")
+    assert page.inner_text("#drive-cause").startswith(f"Method: constrained 42 % - {why}")
+    feed.seat = {**feed.seat, "sticks": {**ZERO, "left_x": 0.4}}
+    feed.send(lambda: page.is_disabled("#method"))
+
+
 def test_pattern_and_fine_change_only_as_the_server_says(feed: DriveFeed) -> None:
     page = feed.page
     levers = feed.shown("limits")["levers"]
     assert levers["left up"] == ["stick out", 100]
     assert levers["right down"] == ["boom up", 100]
     page.click("#pattern")
-    feed.send(lambda: feed.of("setting") == [{"type": "setting", "pattern": "SAE", "fine": False}])
+    feed.send(lambda: feed.of("setting") == [{**SETTING, "pattern": "SAE"}])
     assert page.inner_text("#pattern") == "ISO"
     feed.seat = {**feed.seat, "pattern": "SAE"}
     feed.send(lambda: page.inner_text("#pattern") == "SAE")
@@ -544,7 +579,7 @@ def test_pattern_and_fine_change_only_as_the_server_says(feed: DriveFeed) -> Non
     assert levers["right up"] == ["stick out", 100]
     assert levers["left left"] == ["swing left", 100]
     page.click("#fine")
-    wanted = {"type": "setting", "pattern": "SAE", "fine": True}
+    wanted = {**SETTING, "pattern": "SAE", "fine": True}
     feed.send(lambda: feed.of("setting")[-1] == wanted)
     # Not while the dead-man is held.
     page.keyboard.down(" ")
@@ -728,7 +763,11 @@ def situations(feed: DriveFeed) -> dict[str, Any]:
     """Name -> what the server says then."""
 
     def idle() -> None:
+        slow = "{} at full speed needs 4.36 m to stop and enters the limit: p_u = 0.80 m and p_l = "
+        slow += "0.20 m leave 0.60 m; p_u must be at least 4.56 m."
+        told = method(warnings=[slow.format(joint) for joint in JOINTS[:3]])
         feed.still()
+        feed.seat = {**feed.seat, "decision": {"left": {**decision(), "method": told}}}
 
     def pause() -> None:
         feed.still("Pause", why="dead-man released")
@@ -738,7 +777,8 @@ def situations(feed: DriveFeed) -> dict[str, Any]:
         feed.seat = {**feed.seat, "sticks": {**ZERO, "left_x": -0.7, "track_left": 0.5}}
 
     def limit() -> None:
-        feed.seat = {**feed.seat, "decision": {"left": limited(0.4, 0.0)}}
+        told = method("constrained", scale=0.42, why=["stick to gauge:T1 0.31 m"])
+        feed.seat = {**feed.seat, "decision": {"left": {**limited(0.4, 0.0), "method": told}}}
         feed.machines["left"] = remote("anna", round_trip=0.18, level="slow")
 
     def stop() -> None:

@@ -11,12 +11,14 @@ import pytest
 from backend.control.patterns import (
     DEAD_ZONE,
     FINE,
+    Method,
     Pattern,
     Setting,
     Sticks,
     deflection,
     neutral,
     velocities,
+    with_method,
     with_pattern,
 )
 from backend.machine import kinematics
@@ -90,3 +92,8 @@ def test_not_a_number_is_no_neutral() -> None:
 def test_the_pattern_changes_in_neutral_only() -> None:
     assert with_pattern(ISO, Pattern.SAE, Sticks(left_y=0.5)) is ISO
     assert with_pattern(ISO, Pattern.SAE, Sticks()).pattern is Pattern.SAE
+
+
+def test_the_method_changes_in_neutral_only() -> None:
+    assert with_method(ISO, Method.CONSTRAINED, Sticks(track_left=0.5)) is ISO
+    assert with_method(ISO, Method.CONSTRAINED, Sticks()).method is Method.CONSTRAINED

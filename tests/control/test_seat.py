@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from backend.control.console import PRESENT, State
-from backend.control.patterns import Pattern, Sticks
+from backend.control.patterns import Method, Pattern, Sticks
 from backend.control.person import Person
 from backend.control.seat import (
     Buttons,
@@ -137,6 +137,17 @@ def test_the_pattern_changes_in_neutral_only() -> None:
     assert set_up(sat.seat, Pattern.SAE, False).setting.pattern is Pattern.ISO
     sat.cycle(1)
     assert set_up(sat.seat, Pattern.SAE, True).setting.pattern is Pattern.SAE
+
+
+def test_the_method_changes_in_neutral_only() -> None:
+    sat = Sat().drive()
+    assert sat.seat.setting.method is Method.BRAKING
+    held = set_up(sat.seat, Pattern.ISO, True, Method.SCALING)
+    assert (held.setting.method, held.setting.fine) == (Method.BRAKING, True)
+    sat.cycle(1)
+    chosen = set_up(sat.seat, Pattern.ISO, False, Method.SCALING)
+    assert chosen.setting.method is Method.SCALING
+    assert set_up(chosen, Pattern.SAE, False).setting.method is Method.SCALING
 
 
 def test_fine_is_slower() -> None:

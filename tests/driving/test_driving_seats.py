@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -10,12 +11,16 @@ import pytest
 from test_leases import Radio
 
 from backend.control.latency import Condition
+from backend.control.patterns import Method
 from backend.control.person import OPERATOR, SUPERVISOR, VIEWER, Person
 from backend.machine.load import load_machine
-from backend.safety.limiter import Decision
+from backend.planning.records import Thresholds
+from backend.safety.limiter import Decision, Wish
 from backend.safety.record import Concern, Level
+from backend.shell.app.driving_models import SeatModel
 from backend.shell.driving.driving import Driving
 from backend.shell.driving.leases import Leases
+from backend.shell.driving.methods import Told
 
 MINI = load_machine("mini")
 N = len(MINI.joints)
@@ -42,6 +47,24 @@ class Outlet:
     def close(self) -> None: ...
 
 
+class Methods:
+    """Leaves a share of the joints' wish, and notes what it was asked for."""
+
+    def __init__(self) -> None:
+        self.share = 0.5
+        self.asked: list[tuple[Method, bool]] = []
+
+    def shape(
+        self, name: str, method: Method, wish: Wish, snapshot: Any, overridden: bool
+    ) -> tuple[Wish, Told]:
+        self.asked.append((method, overridden))
+        if method is Method.BRAKING:
+            return wish, Told(method, Thresholds())
+        why = (f"stick of {name} to gauge:T1 0.31 m",)
+        told = Told(method, Thresholds(0.9, 0.3), self.share, why, ("swing needs 3.55 m",))
+        return replace(wish, joints=self.share * wish.joints), told
+
+
 class Cockpit:
     """One cockpit and one machine, a cycle every 20 ms."""
 
@@ -49,6 +72,7 @@ class Cockpit:
         self.radio = Radio()
         self.radio.now = 100.0
         self.outlet = Outlet()
+        self.methods = Methods()
         self.events: list[tuple[str, str, dict[str, Any]]] = []
         leases = Leases(self.radio.ask, self.radio.clock)
         self.driving = Driving(
@@ -56,6 +80,7 @@ class Cockpit:
             {"left": self.outlet},  # type: ignore[dict-item]
             leases,
             dict,
+            self.methods,  # type: ignore[arg-type]
             lambda *event: self.events.append(event),
             self.radio.clock,
         )
@@ -282,6 +307,7 @@ def test_a_page_that_is_gone_sends_nothing_more(cockpit: Cockpit) -> None:
         {"type": "lease", "do": "request", "machine": "no such"},
         {"type": "drive", "machine": 7},
         {"type": "setting", "pattern": "XYZ", "fine": True},
+        {"type": "setting", "pattern": "ISO", "fine": True, "method": "XYZ"},
         {"type": "override", "reason": "x" * 1000},
     ],
 )
@@ -306,6 +332,92 @@ def test_an_override_is_a_supervisors_and_noted_with_its_reason(cockpit: Cockpit
         assert bool(one.swing()) is moved
         noted = [d for kind, _, d in one.events if kind == "console" and d["to"] == "Override"]
         assert [d["reason"] for d in noted] == (["bucket is stuck"] if moved else [])
+
+
+def choose(cockpit: Cockpit, seat: str, method: str) -> dict[str, Any]:
+    cockpit.say(seat, "setting", pattern="ISO", fine=False, method=method)
+    found: dict[str, Any] = cockpit.driving.document()["seats"][seat]
+    return found
+
+
+@pytest.mark.parametrize("method", ["scaling", "potential", "constrained"])
+def test_a_method_shapes_the_wish_and_is_told(cockpit: Cockpit, method: str) -> None:
+    seat = cockpit.sit()
+    assert choose(cockpit, seat, method)["method"] == method
+    cockpit.drive(seat)
+    document = cockpit.driving.document()["seats"][seat]
+    shaped, told = cockpit.swing(), document["decision"]["left"]["method"]
+    assert told == {
+        "name": method,
+        "upper": 0.9,
+        "lower": 0.3,
+        "scale": 0.5,
+        "why": ["stick of left to gauge:T1 0.31 m"],
+        "warnings": ["swing needs 3.55 m"],
+    }
+    SeatModel.model_validate(document)
+    plain = Cockpit()
+    plain.drive(plain.sit())
+    assert shaped == pytest.approx(0.5 * plain.swing())
+    noted = [details for kind, _, details in cockpit.events if kind == "setting"]
+    assert [details["method"].value for details in noted] == [method]
+
+
+def test_the_limiter_comes_after_the_method(cockpit: Cockpit) -> None:
+    seat = cockpit.sit()
+    choose(cockpit, seat, "scaling")
+    cockpit.drive(seat)
+    cockpit.level, cockpit.allowed = Level.STOP, 0.0
+    cockpit.run(1)
+    assert cockpit.swing() == 0.0
+    assert cockpit.outlet.sent[-1][0].fraction[0].tolist() == [0.0, 0.0]
+
+
+def test_a_method_changes_in_neutral_only_and_stays_when_none_is_said(cockpit: Cockpit) -> None:
+    seat = cockpit.sit()
+    cockpit.drive(seat)
+    assert choose(cockpit, seat, "scaling")["method"] == "braking"
+    cockpit.move(seat, enable=False, left_x=0.0)
+    cockpit.run()
+    assert choose(cockpit, seat, "scaling")["method"] == "scaling"
+    cockpit.say(seat, "setting", pattern="SAE", fine=False)
+    assert cockpit.driving.document()["seats"][seat]["method"] == "scaling"
+
+
+def test_a_method_that_stops_a_joint_neither_latches_it_nor_lets_it_go(cockpit: Cockpit) -> None:
+    seat = cockpit.sit()
+    choose(cockpit, seat, "constrained")
+    cockpit.drive(seat)
+    cockpit.methods.share = 0.0
+    cockpit.run(3)
+    assert cockpit.swing() == 0.0
+    cockpit.methods.share = 0.5
+    cockpit.run(1)
+    assert cockpit.swing() != 0.0  # no neutral was needed
+    cockpit.level, cockpit.allowed = Level.STOP, 0.0  # the limiter's own stop
+    cockpit.run(1)
+    cockpit.level, cockpit.allowed = Level.CLEAR, 1.0
+    cockpit.methods.share = 0.0
+    cockpit.run(3)  # the stick is still held: this is no neutral
+    cockpit.methods.share = 0.5
+    cockpit.run(3)
+    assert cockpit.swing() == 0.0
+    cockpit.move(seat, left_x=0.0)
+    cockpit.run(2)
+    cockpit.move(seat, left_x=0.8)
+    cockpit.run(2)
+    assert cockpit.swing() != 0.0
+
+
+def test_a_method_is_told_of_an_override() -> None:
+    cockpit = Cockpit()
+    seat = cockpit.sit(SUPERVISOR, "sue")
+    cockpit.drive(seat)
+    assert not any(overridden for _, overridden in cockpit.methods.asked)
+    cockpit.say(seat, "override", reason="bucket is stuck")
+    cockpit.move(seat, override=True)
+    cockpit.run(3)
+    assert cockpit.methods.asked[-1] == (Method.BRAKING, True)
 
 
 def test_motion_is_noted_from_its_beginning_to_its_end(cockpit: Cockpit) -> None:

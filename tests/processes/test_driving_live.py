@@ -58,6 +58,19 @@ def test_sticks_move_the_machine_and_the_other_goes_on(operator: Operator, tap: 
     assert 0.0 < operator.machine("left")["round_trip"] < 5.0
 
 
+@pytest.mark.parametrize("method", ["scaling", "potential", "constrained"])
+def test_a_method_shapes_what_moves_the_machine(
+    operator: Operator, tap: Wiretap, method: str
+) -> None:
+    operator.say("setting", pattern="ISO", fine=False, method=method)
+    operator.wait(lambda: operator.seat.get("method") == method)
+    moving(operator, tap)
+    told = operator.seat["decision"]["left"]["method"]
+    assert (told["name"], told["upper"], told["lower"]) == (method, 0.8, 0.2)
+    assert 0.0 < told["scale"] <= 1.0
+    assert not any("STOP" in line or "left out" in line for line in told["why"])
+
+
 @pytest.mark.parametrize("lost", [{"enable": False}, {"focus": False}, {"gamepad": False}])
 def test_what_is_let_go_sends_zero_and_stays_so(
     operator: Operator, tap: Wiretap, lost: dict[str, bool]

@@ -71,13 +71,20 @@ def concern(part: Approach | None = None, level=Level.CLEAR, allowed=None, trave
     )  # fmt: skip
 
 
-def decide(wish, *concerns, latch=None, delay=DELAY, now=0.0, q=Q, override=None) -> Decision:
+def wished(wish: dict) -> Wish:
     w = np.zeros(M)
     for k, value in wish.items():
         w[k] = value * FULL[k]
+    return Wish(w[:N], w[N:])
+
+
+def decide(
+    wish, *concerns, latch=None, delay=DELAY, now=0.0, q=Q, override=None, sticks=None
+) -> Decision:
     return limit(
-        *("left", MACHINE, q, Wish(w[:N], w[N:]), concerns, delay),
+        *("left", MACHINE, q, wished(wish), concerns, delay),
         *(latch or open_latch(MACHINE), now, override),
+        None if sticks is None else wished(sticks),
     )
 
 
@@ -283,6 +290,18 @@ def test_brought_to_zero_needs_neutral_to_approach_again() -> None:
     neutral = decide({}, FREE, latch=held.latch)
     assert not neutral.latch.shut.any()
     assert decide({0: 1.0}, FREE, latch=neutral.latch).joints[0] == FULL[0]
+
+
+def test_a_wish_that_was_shaped_to_zero_is_no_neutral() -> None:
+    blocked = concern(approach(row(0.0, {0: -2.0})))
+    first = decide({0: 0.5}, blocked, sticks={0: 1.0})
+    assert first.latch.shut[0].tolist() == [False, True]
+    shaped = decide({}, FREE, latch=first.latch, sticks={0: 1.0})
+    assert shaped.latch.shut[0].tolist() == [False, True]
+    assert decide({0: 0.5}, FREE, latch=shaped.latch, sticks={0: 1.0}).joints[0] == 0.0
+    assert not decide({}, FREE, latch=first.latch, sticks={}).latch.shut.any()
+    # Nor is it a stop of the limiter's.
+    assert not decide({}, blocked, sticks={0: 1.0}).latch.shut.any()
 
 
 def test_slowed_but_moving_does_not_latch() -> None:

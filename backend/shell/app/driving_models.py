@@ -43,6 +43,17 @@ class CauseModel(BaseModel):
     reason: str
 
 
+class MethodModel(BaseModel):
+    """What shaped the sticks' wish before the limiter (Mäkinen 2021, Section 3.3)."""
+
+    name: str = Field(description="braking (the limiter alone), scaling, potential or constrained")
+    upper: float = Field(description="p_u, from where on a limit is felt [m]")
+    lower: float = Field(description="p_l, what is kept from it [m]")
+    scale: float = Field(description="smallest share that a deflected joint has left, 0..1")
+    why: list[str] = Field(description="what held back, the closest first; or why it is left out")
+    warnings: list[str] = Field(description="joints that cannot stop between p_u and p_l")
+
+
 class DecisionModel(BaseModel):
     """What the limiter made of the sticks. Motions: joints by role, track_left, track_right."""
 
@@ -51,6 +62,7 @@ class DecisionModel(BaseModel):
     causes: dict[str, list[CauseModel]] = Field(description=f"why less than full, {PAIR}")
     cut: dict[str, str] = Field(description="why the command is less than that")
     command: dict[str, float] = Field(description="sent [rad/s]; tracks [m/s]")
+    method: MethodModel
 
 
 class SeatModel(BaseModel):
@@ -61,6 +73,7 @@ class SeatModel(BaseModel):
     driven: str = Field(description="the machine that the sticks belong to")
     pattern: str = Field(description="ISO or SAE")
     fine: bool
+    method: str = Field(description="braking, scaling, potential or constrained")
     override: str = Field(description="reason of an override, while it may be held")
     source: str = Field(description="gamepad, keyboard, screen or empty")
     sticks: SticksModel

@@ -11,6 +11,7 @@ from backend.control.seat import Seat
 from backend.machine.model import Machine
 from backend.safety.limiter import Decision
 from backend.shell.driving.leases import Held
+from backend.shell.driving.methods import Told
 from backend.shell.driving.outlet import TRACKS
 from backend.shell.link.messages import AgentStatus
 
@@ -40,10 +41,12 @@ def seat_document(
     seat: Seat,
     held: Mapping[str, Held],
     refused: Mapping[str, str],
-    decisions: Mapping[str, Decision],
+    decisions: Mapping[str, tuple[Decision, Told]],
     machines: Mapping[str, Machine],
 ) -> dict[str, Any]:
-    """name: of the seat; refused: by machine, what its last request was answered with."""
+    """name: of the seat; refused: by machine, what its last request was answered with; decisions:
+    by machine, with what the seat's method made of the wish before.
+    """
     mine = [machine for machine, lease in held.items() if lease.seat == name]
     return {
         "who": seat.person.who,
@@ -51,6 +54,7 @@ def seat_document(
         "driven": seat.desk.driven,
         "pattern": seat.setting.pattern.value,
         "fine": seat.setting.fine,
+        "method": seat.setting.method.value,
         "override": seat.reason,
         "source": seat.input.source,
         "sticks": vars(seat.input.sticks),
@@ -65,14 +69,14 @@ def seat_document(
             for machine, console in seat.desk.consoles.items()
         },
         "decision": {
-            machine: decision_document(decisions[machine], machines[machine])
+            machine: decision_document(*decisions[machine], machines[machine])
             for machine in mine
             if machine in decisions
         },
     }
 
 
-def decision_document(decision: Decision, machine: Machine) -> dict[str, Any]:
+def decision_document(decision: Decision, told: Told, machine: Machine) -> dict[str, Any]:
     """By motion: joints by role, then the tracks; pairs are (negative, positive)."""
     motions = (*(joint.role for joint in machine.joints), *TRACKS)
     command = [*decision.joints.tolist(), *decision.tracks.tolist()]
@@ -85,4 +89,12 @@ def decision_document(decision: Decision, machine: Machine) -> dict[str, Any]:
         },
         "cut": {motions[k]: cause.reason for k, cause in decision.cut.items()},
         "command": dict(zip(motions, command, strict=True)),
+        "method": {
+            "name": told.method.value,
+            "upper": told.thresholds.upper,
+            "lower": told.thresholds.lower,
+            "scale": told.scale,
+            "why": list(told.why),
+            "warnings": list(told.warnings),
+        },
     }

@@ -1,6 +1,6 @@
 """Driving: from what operators do on their pages to commands within limits, each cycle.
 
-    page → seat (console, sticks) → wish → limiter → command and limits → the machine's own agent
+    page → seat (console, sticks) → wish → method → limiter → command and limits → machine's agent
 
 Everything here may die at any moment: commands and limits have a time-to-live that the machine's
 agent enforces, leases end when nobody refreshes them, and nothing arms itself afterwards.
@@ -27,6 +27,7 @@ from backend.safety.limits import Delay
 from backend.shell.driving import pages
 from backend.shell.driving.document import machine_document, seat_document
 from backend.shell.driving.leases import REFRESH, Held, Leases
+from backend.shell.driving.methods import Methods, Told
 from backend.shell.driving.outlet import Outlet
 from backend.shell.link.messages import AgentStatus
 
@@ -54,7 +55,8 @@ class _Fencing:
 class Driving:
     """All seats of one cockpit. Thread-safe; `cycle` belongs to the fast loop.
 
-    machines: those that may be driven from here; statuses: the newest reports of all agents.
+    machines: those that may be driven from here; statuses: the newest reports of all agents;
+    methods: what shapes the wishes before the limiter.
     """
 
     def __init__(
@@ -63,6 +65,7 @@ class Driving:
         outlets: Mapping[str, Outlet],
         leases: Leases,
         statuses: Callable[[], Mapping[str, AgentStatus]],
+        methods: Methods,
         event: Event = lambda *_: None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
@@ -70,11 +73,12 @@ class Driving:
         self._outlets = dict(outlets)
         self._leases = leases
         self._statuses = statuses
+        self._methods = methods
         self._event = event
         self._clock = clock
         self._lock = threading.Lock()
         self._seats: dict[str, Seat] = {}
-        self._decisions: dict[str, Decision] = {}
+        self._decisions: dict[str, tuple[Decision, Told]] = {}
         self._fencing: dict[str, _Fencing] = {}
         self._stopped: dict[str, str] = {}  # machines that nobody has reset since, and why
         self._refused: set[str] = set()
@@ -193,7 +197,9 @@ class Driving:
             },
         }
 
-    def _drive(self, name: str, seat: Seat, lease: Held, snapshot: Snapshot) -> Decision:
+    def _drive(
+        self, name: str, seat: Seat, lease: Held, snapshot: Snapshot
+    ) -> tuple[Decision, Told]:
         machine, outlet = self._machines[name], self._outlets[name]
         fencing = self._fencing.get(name)
         if fencing is None or fencing.token != lease.token:
@@ -202,22 +208,27 @@ class Driving:
         # How the round trip divides is not known: all of it may be the command's way.
         up = min(link.round_trip, MOST_UP)
         delay = Delay(up, math.inf if link.locked else link.round_trip)
+        sticks, override = seats.wish(seat, name, machine), seats.override(seat, name)
+        shaped, told = self._methods.shape(
+            name, seat.setting.method, sticks, snapshot, overridden=override is not None
+        )
         decision = limit(
             name,
             machine,
             snapshot.machines[name].pose.joints,
-            seats.wish(seat, name, machine),
+            shaped,
             snapshot.concerns,
             delay,
             fencing.latch,
             snapshot.time,
-            seats.override(seat, name),
+            override,
+            sticks,
         )
         if link.locked:
             decision = replace(decision, locked=link.locked)
         self._fencing[name] = _Fencing(lease.token, decision.latch)
         outlet.send(decision, lease.who, lease.token)
-        return decision
+        return decision, told
 
     def _refresh(self) -> None:
         while not self._stopping.wait(REFRESH / 3.0):
@@ -295,7 +306,7 @@ def _heard(seat: Seat, said: pages.Said, now: float) -> Seat:
     if isinstance(said, pages.DriveSaid):
         return seats.drives(seat, said.machine, now) if said.machine in seat.desk.consoles else seat
     if isinstance(said, pages.SettingSaid):
-        return seats.set_up(seat, said.pattern, said.fine)
+        return seats.set_up(seat, said.pattern, said.fine, said.method)
     if isinstance(said, pages.OverrideSaid):
         return replace(seat, reason=said.reason if seat.person.may_override else "")
     if isinstance(said, pages.ResetSaid):

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 import msgspec
 
 from backend.control.lease import LONGEST, Kind
-from backend.control.patterns import Pattern, Sticks
+from backend.control.patterns import Method, Pattern, Sticks
 from backend.control.seat import Input
 
 Deflection = Annotated[float, msgspec.Meta(ge=-1.0, le=1.0)]
@@ -76,8 +76,11 @@ class DriveSaid(msgspec.Struct, tag_field="type", tag="drive"):
 
 
 class SettingSaid(msgspec.Struct, tag_field="type", tag="setting"):
+    """method: None for the one that the seat has."""
+
     pattern: Pattern
     fine: bool
+    method: Method | None = None
 
 
 class OverrideSaid(msgspec.Struct, tag_field="type", tag="override"):

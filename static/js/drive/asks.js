@@ -1,7 +1,7 @@
 // What the operator asks of the server besides the sticks and STOP.
 
 import { state } from "../state.js";
-import { controllable, holds, pattern, seat } from "./driving.js";
+import { controllable, holds, method, pattern, seat } from "./driving.js";
 import * as loss from "./loss.js";
 
 let send = () => {};
@@ -30,7 +30,7 @@ export function pause() {
 }
 
 export const reset = () => send({ type: "reset" });
-export const setting = (changes) => send({ type: "setting", pattern: pattern(), fine: Boolean(seat()?.fine), ...changes });
+export const setting = (changes) => send({ type: "setting", pattern: pattern(), fine: Boolean(seat()?.fine), method: method(), ...changes });
 export const overrideReason = (reason) => send({ type: "override", reason });
 
 /** The own machine was chosen: where this seat has it, the sticks follow. */

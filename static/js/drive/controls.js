@@ -2,9 +2,10 @@
 
 import { $, make, write } from "../words.js";
 import { label, state } from "../state.js";
-import { consoles, controllable, driving, holds, remote, seat, supervisor } from "./driving.js";
-import { lease, overrideReason, pause } from "./asks.js";
+import { consoles, controllable, decision, driving, holds, method, remote, seat, supervisor } from "./driving.js";
+import { lease, overrideReason, pause, setting } from "./asks.js";
 import { openMapping } from "./editor.js";
+import { still } from "./operator.js";
 
 let others = "";
 
@@ -50,6 +51,7 @@ export function startControls() {
     overrideReason(reason);
     answer("Hold OVERRIDE or O to run; the dead-man as well.");
   });
+  $("method").addEventListener("change", () => still() && setting({ method: $("method").value }));
   $("override-clear").addEventListener("click", () => overrideReason(""));
   $("release-more").addEventListener("click", () => lease("release"));
   $("pause").addEventListener("click", pause);
@@ -62,6 +64,19 @@ function holderText() {
   const refused = consoles()[state.own]?.refused;
   const who = r.holder ? `${label(state.own)} is driven by ${r.holder}` : `Nobody drives ${label(state.own)} remotely`;
   return `You are ${state.you?.who} (${state.you?.role}). ${who}${r.offered_to ? `, offered to ${r.offered_to}` : ""}.${refused ? ` Refused: ${refused}.` : ""}`;
+}
+
+const meters = (value) => (Number.isFinite(value) ? `${value.toFixed(2)} m` : "?");
+
+/** The method is the server's word; which joints cannot stop within its distances is said below. */
+function showMethod(mine) {
+  $("method-row").hidden = $("method-note").hidden = !mine;
+  if ($("method").value !== method()) $("method").value = method();
+  if ($("method").disabled === still()) $("method").disabled = !still();
+  const told = decision(state.own)?.method;
+  const kept = told ? `p_u ${meters(told.upper)}, p_l ${meters(told.lower)}. ` : "";
+  const lines = [`${kept}The limiter comes after it in any case.`, ...(told?.warnings ?? []).map((line) => `▲ ${line}`)];
+  write($("method-note"), lines.join("\n"));
 }
 
 /** Ten times a second. */
@@ -77,6 +92,7 @@ export function update() {
   $("take-over").hidden = mine || !remote(state.own)?.holder;
   $("override-form").hidden = !supervisor() || !mine;
   $("override-clear").hidden = !seat()?.override;
+  showMethod(mine);
   for (const id of ["release-more", "pause"]) $(id).hidden = !mine;
   const names = [...new Set(Object.values(driving()?.seats ?? {}).filter((one) => one.role !== "viewer").map((one) => one.who))].filter((who) => who && who !== state.you?.who);
   if (names.join("\n") === others) return;

@@ -29,4 +29,6 @@ export const latched = () => Object.values(driving()?.seats ?? {}).some((one) =>
 export const mayReset = () => stopped(consoles());
 
 export const pattern = () => (seat()?.pattern === "SAE" ? "SAE" : "ISO");
+/** What shapes the wish before the limiter: braking is the limiter alone. */
+export const method = () => seat()?.method ?? "braking";
 export const decision = (name) => (holds(name) ? seat()?.decision?.[name] ?? null : null);

@@ -2,6 +2,7 @@
 
 import { silence, state } from "../state.js";
 import * as compose from "./compose.js";
+import { neutral } from "./deflection.js";
 import * as focus from "./focus.js";
 import * as keyboard from "./keyboard.js";
 import * as pads from "./pads.js";
@@ -21,6 +22,9 @@ export let slots = [null, null];
 
 /** What is in use, and why nothing moves. */
 export const input = () => now;
+
+/** Nothing is deflected or held, here and as the server knows it. */
+export const still = () => neutral(now.deflection) && neutral(seat()?.sticks) && !now.enable;
 
 /** The mapping was changed: what it makes of the present axes is nobody's wish. */
 export function changeMapping(changed) {

@@ -6,8 +6,7 @@ import { consoleShape } from "../glyphs.js";
 import { widest } from "../headers.js";
 import * as asks from "./asks.js";
 import { controllable, driving, holds, latched, mayReset, pattern, remote, seat } from "./driving.js";
-import { neutral } from "./deflection.js";
-import { input, override, stop } from "./operator.js";
+import { input, override, still, stop } from "./operator.js";
 import { levers } from "./levers.js";
 import * as say from "./say.js";
 import * as screen from "./screen.js";
@@ -15,8 +14,6 @@ import { openControls } from "./controls.js";
 import { openMapping } from "./editor.js";
 
 let shape = "";
-
-const still = () => neutral(input().deflection) && neutral(seat()?.sticks) && !input().enable;
 
 const enabled = (node, on) => {
   if (node.disabled === on) node.disabled = !on;

@@ -2,7 +2,7 @@
 
 import { label, state } from "../state.js";
 import { percent, isBlocked } from "../plots/arrow.js";
-import { consoles, holds, pattern, remote, seat } from "./driving.js";
+import { consoles, decision, holds, method, pattern, remote, seat } from "./driving.js";
 import { buttonWord } from "./mapping.js";
 import { mapping } from "./store.js";
 import { input, slots } from "./operator.js";
@@ -55,11 +55,21 @@ export function lines(name) {
   return [`${sentence(why)} Sticks in neutral, then hold ${hold}`.trim(), `Hold ${hold} to enable`];
 }
 
-/** The worst cause in one line. */
-export function cause(name) {
+/** What the method holds back before the limiter, or why it does nothing; empty where all passes. */
+function shaped(name) {
+  const { name: way, scale, why } = decision(name)?.method ?? {};
+  if (!way || (!(scale < 1) && !why?.length)) return "";
+  const share = scale < 1 ? ` ${percent(scale)}` : "";
+  return `Method: ${way}${share}${why?.length ? ` - ${why[0]}` : ""}`;
+}
+
+/** What the method holds back and the worst cause, in one line. */
+export const cause = (name) => [shaped(name), limited(name)].filter(Boolean).join(" · ");
+
+function limited(name) {
   const { all, enforced } = levers(name);
   const bad = worst(name, all);
   if (bad) return `${upper(bad.joint)} ${bad.word} ${isBlocked(bad.allowed) ? "blocked" : percent(bad.allowed)}${bad.why ? `: ${bad.why}` : ""}`;
   const { source } = input();
-  return holds(name) ? `All free · ${source || "no device used yet"} · ${pattern()}${seat()?.fine ? " · fine" : ""}` : enforced ? "All free" : "Advice: all free";
+  return holds(name) ? `All free · ${source || "no device used yet"} · ${pattern()}${seat()?.fine ? " · fine" : ""}${method() === "braking" ? "" : ` · ${method()}`}` : enforced ? "All free" : "Advice: all free";
 }
