@@ -13,8 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from backend.tracking.association_kernel import exact
 from backend.spatial.types import Array, IntArray
+from backend.tracking.association_kernel import exact
 
 LARGEST_EXACT = 8
 """Clusters in which both tracks and detections are more than this are approximated."""

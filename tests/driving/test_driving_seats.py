@@ -252,6 +252,7 @@ def test_stop_reaches_a_machine_that_another_cockpit_drives() -> None:
         {"left": there.outlet},  # type: ignore[dict-item]
         Leases(here.radio.ask, here.radio.clock),
         dict,
+        there.methods,
         clock=here.radio.clock,
     )
     status = SimpleNamespace(holder="ann")
@@ -260,6 +261,7 @@ def test_stop_reaches_a_machine_that_another_cockpit_drives() -> None:
         {"left": here.outlet},  # type: ignore[dict-item]
         Leases(here.radio.ask, here.radio.clock),
         lambda: {"left": status},  # type: ignore[dict-item,return-value]
+        here.methods,
         lambda *event: here.events.append(event),
         here.radio.clock,
     )
