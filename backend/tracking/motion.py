@@ -1,0 +1,105 @@
+"""The three motion models: constant velocity, constant turn, and stopping or random motion.
+
+CV and CT as in Rasul 2021, Eqs. (2)-(5), in the Cartesian form in which they are consistent: the
+velocity itself turns by the turn rate, the box's yaw along with it. The third model, asked for in
+that paper's outlook, lets the velocity fade and change at random (Ornstein-Uhlenbeck), as people
+do who stop, start and turn on the spot.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from backend.spatial.types import Array
+from backend.tracking.records import (
+    HEIGHT,
+    LENGTH,
+    PX,
+    PY,
+    PZ,
+    STATE,
+    TURN,
+    VX,
+    VY,
+    VZ,
+    WIDTH,
+    YAW,
+)
+
+CV, CT, RANDOM = range(3)
+MODELS = 3
+_STRAIGHT = 1e-6  # turned angle below which the series is used [rad]
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Spectral densities of white noise by model (CV, CT, RANDOM): acceleration [m^2/s^3], turn
+    rate [rad^2/s^3]; of all: vertical acceleration, yaw [rad^2/s], size [m^2/s]. fade: time in
+    which the third model's velocity falls to 1/e [s]; stay: mean time in one model [s].
+    """
+
+    acceleration: tuple[float, float, float] = (0.05, 0.1, 3.0)
+    turn: tuple[float, float, float] = (0.1, 1.0, 0.1)
+    vertical: float = 0.05
+    yaw: float = 0.5
+    size: float = 0.01
+    fade: float = 1.0
+    stay: float = 1.0
+
+
+def moved(model: int, x: Array, dt: float, noise: Noise) -> Array:
+    """States (..., 11) after dt [s]."""
+    out = x.copy()
+    if model == RANDOM:
+        kept = np.exp(-dt / noise.fade)
+        way = noise.fade * (1.0 - kept)
+        out[..., PX] += way * x[..., VX]
+        out[..., PY] += way * x[..., VY]
+        out[..., PZ] += way * x[..., VZ]
+        for speed in (VX, VY, VZ, TURN):
+            out[..., speed] *= kept
+        return out
+    out[..., PZ] += dt * x[..., VZ]
+    if model == CV:
+        out[..., PX] += dt * x[..., VX]
+        out[..., PY] += dt * x[..., VY]
+        return out
+    angle = dt * x[..., TURN]
+    small = np.abs(angle) < _STRAIGHT
+    safe = np.where(small, 1.0, angle)
+    ahead = dt * np.where(small, 1.0 - angle**2 / 6.0, np.sin(safe) / safe)
+    aside = dt * np.where(small, 0.5 * angle, (1.0 - np.cos(safe)) / safe)
+    sine, cosine = np.sin(angle), np.cos(angle)
+    vx, vy = x[..., VX], x[..., VY]
+    out[..., PX] += ahead * vx - aside * vy
+    out[..., PY] += aside * vx + ahead * vy
+    out[..., VX] = cosine * vx - sine * vy
+    out[..., VY] = sine * vx + cosine * vy
+    out[..., YAW] += angle
+    return out
+
+
+def jolts(dt: float, noise: Noise) -> Array:
+    """(r, 11, 11) covariance that each model's noise adds in dt [s]."""
+    Q = np.zeros((MODELS, STATE, STATE))
+    block = np.array([[dt**3 / 3.0, dt**2 / 2.0], [dt**2 / 2.0, dt]])
+    for model in range(MODELS):
+        for p, v, density in (
+            (PX, VX, noise.acceleration[model]),
+            (PY, VY, noise.acceleration[model]),
+            (PZ, VZ, noise.vertical),
+        ):
+            Q[model][np.ix_((p, v), (p, v))] = density * block
+        Q[model, TURN, TURN] = noise.turn[model] * dt
+        Q[model, YAW, YAW] = noise.yaw * dt
+        for size in (LENGTH, WIDTH, HEIGHT):
+            Q[model, size, size] = noise.size * dt
+    return Q
+
+
+def switching(dt: float, noise: Noise) -> Array:
+    """(r, r) probability of each model (column) after dt in another (row): a Markov chain."""
+    stays = np.exp(-dt / noise.stay)
+    return np.asarray(np.full((MODELS, MODELS), (1.0 - stays) / MODELS) + stays * np.eye(MODELS))

@@ -1,0 +1,93 @@
+"""What detections say of tracks: gates, likelihoods, and each model's probabilistic update.
+
+Detections measure some numbers of the state as they are, so that each model's update is a Kalman
+filter's. A box's yaw is known up to half a turn. Every detection counts with the probability that
+it is the track's, and what its hypotheses are apart widens the covariance (PDA, Bar-Shalom and Tse
+1975); each model's probability follows from how well it foretold them.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from scipy.special import chdtri
+
+from backend.spatial.types import Array, BoolArray
+from backend.tracking.imm import Modes
+from backend.tracking.records import HEIGHT, LENGTH, PZ, WIDTH, YAW, Detections, Settings
+
+_BETWEEN = {PZ: 4.0, YAW: np.pi, LENGTH: 3.0, WIDTH: 3.0, HEIGHT: 3.0}
+"""Within which the numbers of a false detection lie: clutter is spread evenly over it [m, rad]."""
+
+
+class Sight(NamedTuple):
+    """n tracks, r models, k detections of d numbers. off: (n, r, k, d) detection less foretold;
+    gain: (n, r, 11, d); S: (n, r, d, d) covariance of the foretold detection; likelihood:
+    (n, r, k); gated: (n, k) whether a detection may be the track's.
+    """
+
+    off: Array
+    gain: Array
+    S: Array
+    likelihood: Array
+    gated: BoolArray
+
+
+def sight(modes: Modes, seen: Detections, settings: Settings) -> Sight:
+    """How each model's prediction agrees with each detection; the gate is that of the model whose
+    S has the largest determinant.
+    """
+    h = list(seen.measured)
+    d = len(h)
+    off = seen.values[None, None] - modes.mean[:, :, None, h]
+    if YAW in h:
+        at = h.index(YAW)
+        off[..., at] = (off[..., at] + 0.5 * np.pi) % np.pi - 0.5 * np.pi
+    PH = modes.cov[..., h]  # (n, r, 11, d)
+    S = PH[:, :, h] + np.diag(seen.noise**2)
+    inverse = np.linalg.inv(S)
+    squared = np.einsum("nrkx,nrxy,nrky->nrk", off, inverse, off)
+    log_det = np.linalg.slogdet(S)[1]
+    likelihood = np.exp(-0.5 * (squared + log_det[..., None] + d * np.log(2.0 * np.pi)))
+    widest = log_det.argmax(axis=1)
+    nearest = np.take_along_axis(squared, widest[:, None, None], axis=1)[:, 0]
+    return Sight(off, PH @ inverse, S, likelihood, nearest <= _gate(d, settings.gate))
+
+
+def ratios(modes: Modes, found: Sight, seen: Detections, settings: Settings) -> Array:
+    """(n, k) see `association.associate`; 0 outside of the gate."""
+    density = settings.clutter
+    for number in seen.measured[2:]:
+        density /= _BETWEEN[number]
+    mixed = np.einsum("nr,nrk->nk", modes.mode, found.likelihood)
+    least = settings.detected / (density * (1.0 - settings.detected))
+    return np.where(found.gated, np.maximum(least * mixed, 1e-300), 0.0)
+
+
+def updated(modes: Modes, found: Sight, share: Array) -> Modes:
+    """Modes after the detections. share: (n, k) probability that a detection is the track's."""
+    none = 1.0 - share.sum(axis=1)
+    weight = modes.mode[:, :, None] * found.likelihood  # (n, r, k)
+    total = np.maximum(weight.sum(axis=1, keepdims=True), 1e-300)
+    joint = share[:, None] * weight / total  # of model and detection
+    missed = none[:, None] * modes.mode
+    mode = joint.sum(axis=2) + missed
+    mode = np.maximum(mode, 1e-6)
+    mode /= mode.sum(axis=1, keepdims=True)
+    beta = joint / np.maximum(joint.sum(axis=2) + missed, 1e-300)[..., None]
+    some = beta.sum(axis=2)  # (n, r) probability of having been detected, by model
+    off = np.einsum("nrk,nrkx->nrx", beta, found.off)
+    mean = modes.mean + np.einsum("nrsx,nrx->nrs", found.gain, off)
+    spread = np.einsum("nrk,nrkx,nrky->nrxy", beta, found.off, found.off)
+    spread -= np.einsum("nrx,nry->nrxy", off, off)
+    middle = spread - some[..., None, None] * found.S
+    K = found.gain
+    cov = modes.cov + K @ middle @ np.swapaxes(K, 2, 3)
+    return Modes(mean, 0.5 * (cov + np.swapaxes(cov, 2, 3)), mode)
+
+
+@lru_cache(maxsize=32)
+def _gate(d: int, share: float) -> float:
+    return float(chdtri(d, 1.0 - share))
