@@ -27,6 +27,7 @@ from cockpit.cli_gauge import gauge
 from cockpit.cli_keys import LinkConfig, keys
 from cockpit.cli_playback import add_commands
 from cockpit.cli_recordings import recordings
+from cockpit.cli_track import track
 from cockpit.logs import LogJson, LogLevel
 
 app = typer.Typer(
@@ -318,6 +319,7 @@ app.command()(keys)
 app.command()(convert)
 app.command()(export)
 app.command()(gauge)
+app.command()(track)
 
 
 def _interrupted() -> threading.Event:

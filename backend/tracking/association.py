@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from backend.spatial.types import Array, IntArray
+from backend.spatial.types import Array, BoolArray, IntArray
 from backend.tracking.association_kernel import exact
 
 LARGEST_EXACT = 8
@@ -39,7 +39,7 @@ def associate(ratio: Array, largest_exact: int = LARGEST_EXACT) -> Association:
     is the product of the ratios of its pairs.
     """
     share, approximated = np.zeros(ratio.shape), False
-    for tracks, detections in clusters(ratio > 0.0):
+    for tracks, detections in clusters(np.asarray(ratio > 0.0)):
         part = ratio[np.ix_(tracks, detections)]
         if part.size == 1:
             found = part / (1.0 + part)
@@ -72,17 +72,17 @@ def propagated(ratio: Array) -> Array:
     return np.asarray(weighted / (1.0 + weighted.sum(axis=1, keepdims=True)))
 
 
-def clusters(gated: Array) -> Iterator[tuple[IntArray, IntArray]]:
+def clusters(gated: BoolArray) -> Iterator[tuple[IntArray, IntArray]]:
     """(tracks, detections) that are connected by gates, each at least one. gated: (n, m)."""
-    left = gated.any(axis=1)
+    left = np.asarray(gated.any(axis=1))
     while left.any():
-        tracks = np.zeros(len(gated), dtype=bool)
+        tracks: BoolArray = np.zeros(len(gated), dtype=bool)
         tracks[np.argmax(left)] = True
         while True:
             detections = gated[tracks].any(axis=0)
-            more = gated[:, detections].any(axis=1)
+            more = np.asarray(gated[:, detections].any(axis=1))
             if (more == tracks).all():
                 break
             tracks = more
-        left &= ~tracks
+        left[tracks] = False
         yield np.flatnonzero(tracks), np.flatnonzero(detections)

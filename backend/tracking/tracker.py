@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from backend.errors import InputError
-from backend.spatial.types import Array, IntArray
+from backend.spatial.types import Array, BoolArray, IntArray
 from backend.tracking.association import associate
 from backend.tracking.imm import Modes, ahead, born, mixed, mixture, predicted
 from backend.tracking.motion import MODELS, Noise, switching
@@ -33,6 +33,7 @@ from backend.tracking.update import ratios, sight, updated
 _SEEN = 0.5  # probability above which a track counts as detected, or a detection as somebody's
 _SAME = 0.15  # tracks whose means are nearer than this are one [m]
 _LONGEST = 0.25  # [s] of one prediction
+_NONE = np.zeros(0, np.int64)
 
 
 class Tracked(NamedTuple):
@@ -53,8 +54,11 @@ def nothing(time: float = -math.inf) -> Tracks:
         np.zeros((0, MODELS, STATE)),
         np.zeros((0, MODELS, STATE, STATE)),
         np.zeros((0, MODELS)),
-        *(np.zeros(0, np.int64) for _ in range(4)),
-        np.zeros(0),
+        id=_NONE,
+        status=_NONE,
+        scans=_NONE,
+        seen=_NONE,
+        last_seen=np.zeros(0),
     )
 
 
@@ -142,7 +146,7 @@ def _kept(tracks: Tracks, settings: Settings) -> tuple[IntArray, tuple[Lost, ...
     return np.flatnonzero(~gone), lost
 
 
-def _twice(tracks: Tracks, mean: Array) -> Array:
+def _twice(tracks: Tracks, mean: Array) -> BoolArray:
     """(n,) tracks that follow what an older one follows."""
     n = len(tracks)
     apart = np.linalg.norm(mean[:, None, :2] - mean[None, :, :2], axis=2)
