@@ -1,0 +1,120 @@
+"""Time to collision against an integration step by step; warning index; levels."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from backend.safety.swing_risk import (
+    Boundaries,
+    Risk,
+    Swing,
+    risk,
+    time_to_collision,
+    warning_index,
+)
+
+END, DT = 8.0, 1e-3
+
+
+def integrated(swing: Swing, place: np.ndarray, velocity: np.ndarray, clearance: float) -> float:
+    """When the swing's line first comes within the clearance, by steps of DT; inf after END."""
+    t = np.arange(0.0, END, DT)
+    rate = swing.rate + swing.acceleration * t
+    if swing.acceleration > 0.0:
+        rate = np.minimum(rate, max(swing.fastest, swing.rate))
+    elif swing.acceleration < 0.0:
+        rate = np.maximum(rate, min(-swing.fastest, swing.rate))
+    middle = 0.5 * (rate[1:] + rate[:-1])
+    angle = swing.angle + np.concatenate([[0.0], np.cumsum(middle) * DT])
+    far = np.hypot(*place)
+    turning = (place[0] * velocity[1] - place[1] * velocity[0]) / far**2
+    away = np.arctan2(place[1], place[0]) + turning * t - angle
+    close = np.abs((away + np.pi) % (2 * np.pi) - np.pi) <= clearance / far
+    return float(t[np.argmax(close)]) if close.any() else np.inf
+
+
+def cases(count: int, seed: int):
+    rng = np.random.default_rng(seed)
+    for _ in range(count):
+        fastest = rng.uniform(0.3, 1.5)
+        swing = Swing(
+            rng.uniform(-np.pi, np.pi),
+            rng.uniform(-fastest, fastest),
+            rng.choice([0.0, rng.uniform(-1.0, 1.0)]),
+            fastest,
+            rng.uniform(0.3, 2.0),
+        )
+        far, at = rng.uniform(1.0, 9.0), rng.uniform(-np.pi, np.pi)
+        place = far * np.array([np.cos(at), np.sin(at)])
+        yield swing, place, rng.uniform(-2.0, 2.0, 2), rng.uniform(0.2, 1.0)
+
+
+def test_against_integration() -> None:
+    for swing, place, velocity, clearance in cases(1_000, 1):
+        found = time_to_collision(swing, place[None], velocity[None], np.array([clearance]))[0]
+        true = integrated(swing, place, velocity, clearance)
+        if np.isinf(true):
+            # Nothing within the time that was integrated; grazing may be a step off.
+            assert found > END - 2 * DT or grazes(swing, place, velocity, clearance)
+        else:
+            assert found == pytest.approx(true, abs=5 * DT) or grazes(
+                swing, place, velocity, clearance
+            )
+            assert found <= true + DT  # never later than it happens
+
+
+def grazes(swing: Swing, place: np.ndarray, velocity: np.ndarray, clearance: float) -> bool:
+    """Whether a hair less or more of clearance decides."""
+    both = [integrated(swing, place, velocity, clearance + off) for off in (-2e-3, 2e-3)]
+    return abs(both[0] - both[1]) > 10 * DT or np.isinf(both[0]) != np.isinf(both[1])
+
+
+def test_by_hand() -> None:
+    swing = Swing(0.0, 0.5, 0.0, 1.0, 1.0)
+    place = np.array([[0.0, 4.0], [4.0, 0.0], [0.0, -4.0]])
+    found = time_to_collision(swing, place, np.zeros((3, 2)), np.full(3, 0.4))
+    np.testing.assert_allclose(found, [(np.pi / 2 - 0.1) / 0.5, 0.0, (1.5 * np.pi - 0.1) / 0.5])
+    # From rest at 1 rad/s^2 up to 1 rad/s: half a radian is done after 1 s.
+    faster = Swing(0.0, 0.0, 1.0, 1.0, 1.0)
+    found = time_to_collision(faster, place[:1], np.zeros((1, 2)), np.full(1, 0.4))
+    np.testing.assert_allclose(found, 1.0 + (np.pi / 2 - 0.1 - 0.5))
+    still = time_to_collision(
+        Swing(0.0, 0.0, 0.0, 1.0, 1.0), place[:1], np.zeros((1, 2)), np.ones(1)
+    )
+    assert np.isinf(still[0])
+
+
+def test_somebody_who_walks_into_a_standing_arm() -> None:
+    still = Swing(0.0, 0.0, 0.0, 1.0, 1.0)
+    place, velocity = np.array([[0.0, 4.0]]), np.array([[1.0, 0.0]])
+    found = time_to_collision(still, place, velocity, np.array([0.4]))
+    np.testing.assert_allclose(found, (np.pi / 2 - 0.1) / 0.25)
+
+
+def test_warning_index_by_hand() -> None:
+    swing = Swing(0.0, 0.5, 0.0, 1.0, 1.0)
+    place, radius, clearance = np.array([[0.0, 4.0]]), np.array([0.3]), np.array([0.5])
+    c = 4.0 * np.pi / 2 - 0.5
+    safety = 4.0 * np.arcsin((0.3 + 0.2 + 0.5) / 4.0)
+    found = warning_index(swing, place, radius, clearance, 0.2, 0.5)
+    np.testing.assert_allclose(found, (c - safety) / (4.0 * 0.25 / 2.0))
+    still = Swing(0.0, 0.0, 0.0, 1.0, 1.0)
+    assert warning_index(still, place, radius, clearance, 0.2, 0.5)[0] == np.inf
+    near = np.array([[0.9, 0.0]])  # the safety clearance has no end there
+    assert warning_index(swing, near, radius, clearance, 0.2, 0.5)[0] == -np.inf
+
+
+def test_levels_and_their_boundaries() -> None:
+    ttc = np.array([9.0, 9.0, 9.0, 1.0, 3.0, 0.5, np.inf, np.nan, 9.0])
+    x = np.array([9.0, 2.0, 1.0, 9.0, 9.0, 9.0, np.inf, 9.0, np.nan])
+    E, W, S = Risk.EMERGENCY, Risk.WARNING, Risk.SAFE
+    assert list(risk(ttc, x)) == [S, W, E, E, W, E, S, E, E]
+    assert list(risk(ttc[:1], x[:1], Boundaries(index=(10.0, 20.0)))) == [E]
+
+
+def test_what_is_not_known_is_an_emergency() -> None:
+    swing = Swing(0.0, 0.5, 0.0, 1.0, 1.0)
+    bad = np.array([[np.nan, 1.0]])
+    assert time_to_collision(swing, bad, np.zeros((1, 2)), np.ones(1))[0] == 0.0
+    assert warning_index(swing, bad, np.ones(1), np.ones(1), 0.1, 0.1)[0] == -np.inf
