@@ -75,8 +75,8 @@ def warning_index(
     """(k,) x = (c - c_sm) / c_br: how many braking distances are left beyond the safety clearance.
 
     c: arc between body and object; c_br: arc that the swing needs to stop; c_sm: arc of the
-    object's radius (k,), `uncertainty` of sensors and control, `keep` [m]. Infinite while nothing needs
-    to brake and more than the safety clearance is left, minus infinite within it.
+    object's radius (k,), of `uncertainty` of sensors and control, and of `keep` [m]. Infinite while
+    nothing needs to brake and more than the safety clearance is left, minus infinite within it.
     """
     place = np.asarray(place, dtype=float)
     far = np.maximum(np.linalg.norm(place, axis=1), 1e-9)
@@ -104,7 +104,7 @@ def _speeding(swing: Swing) -> float:
     a = swing.acceleration
     if a == 0.0:
         return np.inf
-    return max((np.sign(a) * swing.fastest - swing.rate) / a, 0.0)
+    return float(max((np.sign(a) * swing.fastest - swing.rate) / a, 0.0))
 
 
 def _reached(gap: Array, w: Array, a: float, speeding: float) -> Array:
