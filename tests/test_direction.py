@@ -49,7 +49,7 @@ ROOMS: dict[str, set[str]] = {
     "backend.shell": {"backend"},
     "backend.warm": {
         *("backend.pipeline", "backend.cspace", "backend.collision", "backend.machine"),
-        *("backend.safety", "backend.spatial"),
+        *("backend.safety", "backend.site", "backend.spatial"),
     },
     "cockpit": {"backend", "cockpit"},
 }
