@@ -122,7 +122,7 @@ def along_track(
     bodies: SiteBodies,
     span: tuple[float, float],
     question: Question,
-    known: Callable[[Array], Array] | None = None,
+    known: Callable[[Array], BoolArray] | None = None,
 ) -> tuple[Stretch, ...]:
     """The verdicts from span[0] to span[1] [m], in order, without gaps.
 
@@ -166,7 +166,7 @@ def _judged(
     bodies: SiteBodies,
     pending: Array,
     question: Question,
-    known: Callable[[Array], Array] | None,
+    known: Callable[[Array], BoolArray] | None,
 ) -> list[Stretch]:
     s = pending[:, :1] + _SAMPLES * (pending[:, 1:] - pending[:, :1])
     T = frames(s.ravel()).reshape(*s.shape, 4, 4)
