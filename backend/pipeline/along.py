@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from backend.errors import InputError
+from backend.fusion.inflation import spread
 from backend.fusion.pose import Validity
 from backend.pipeline.along_cycle import thinned
 from backend.pipeline.along_track import Placement, Question, Stretch, along_track, placement
@@ -32,8 +33,9 @@ _TURN = math.radians(15.0)  # off the track's heading, either way round, that is
 
 @dataclass(frozen=True)
 class AlongImage:
-    """place: of the machine's root on the track; length: of the track [m]; eta: growth of the
-    bodies [m]; postures: that the last `seconds` [s] were thinned to; reason: why nothing is known,
+    """place: of the machine's root on the track; length: of the track [m]; eta: a clearance of this
+    or less violates, the configured growth and what is not known of the pose; cap: how far is
+    looked [m]; postures: that the last `seconds` [s] were thinned to; reason: why nothing is known,
     else empty; stretches: in order.
     """
 
@@ -78,7 +80,9 @@ def along_image(
     A machine whose pose is not valid gets no stretch, but the reason.
     """
     state, machine = snapshot.machines[own], config.machines[own]
-    question = Question(eta=max(state.eta, config.eta))
+    # How old the pose is does not count: the question is of other places, at another time.
+    eta = config.eta + spread(machine, state.pose)
+    question = Question(eta=eta, cap=max(Question().cap, eta + 1.0))
     place: Placement | None = None
     stretches: tuple[Stretch, ...] = ()
     reason, kept = "", 0

@@ -87,6 +87,7 @@ export function paint(g, width, height, dpr) {
   for (const item of header.bands) band(g, chart, item, dpr);
   const eta = Math.round(y(header.eta)) + 0.5;
   segment(g, box.left, eta, box.right, eta, C.stopLine, 1, [4, 4]);
+  label(g, `violates below ${number(header.eta, 2)}`, box.right - 4, eta - 2, { align: "right", halo: true });
   curve(g, chart, [...clearance].map((v, i) => {
     const at = x((edges[2 * i] + edges[2 * i + 1]) / 2);
     const unknown = header.bands.some((b) => b.state === "unknown" && edges[2 * i] >= b.start - 1e-3 && edges[2 * i + 1] <= b.end + 1e-3);
