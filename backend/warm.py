@@ -19,14 +19,18 @@ from backend.cspace.reach_image import reach_image
 from backend.cspace.regions import regions
 from backend.machine.load import load_machine, shipped_machines
 from backend.machine.outline import outlines_of
+from backend.pipeline.along_cycle import Cycle
+from backend.pipeline.along_track import Placement, Question, along_track
 from backend.pipeline.place import place
 from backend.planning.live import rehearse
 from backend.safety.approach import Motion, approach
 from backend.safety.limiter import Wish, limit, open_latch
 from backend.safety.limits import Delay
 from backend.safety.record import Concern, Level
+from backend.site.named_bodies import SiteBodies
 from backend.spatial import rotation, transform
 from backend.spatial.boxes import Boxes
+from backend.spatial.types import Array
 
 
 def compile_kernels() -> None:
@@ -57,9 +61,18 @@ def compile_kernels() -> None:
     regions(free, (0, 0, 0, 0), wraps=True)
     reach_image(machine, q, layers, (4, 4))
     joint_bar(machine, q, 0, np.array([-1.0, 1.0]), 4, layers, 0.1, np.full(len(q), 0.01))
+    still = Cycle(q[None], np.zeros(0))
+    here = Placement(0.0, 0.0, 0.0, 0.0)
+    standing = SiteBodies(near, machine.body_names)
+    along_track(machine, still, _straight, here, standing, (0.0, 0.5), Question())
     for base in (np.eye(4), tilted):
         driving_zone(machine, q, base, near, 0.1)
         turning_zone(machine, q, base, near, eta=0.1)
+
+
+def _straight(s: Array) -> Array:
+    """A track along x."""
+    return transform.make(np.eye(3), np.stack([s, 0.0 * s, 0.0 * s], axis=-1))
 
 
 def main() -> None:

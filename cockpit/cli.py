@@ -12,6 +12,7 @@ from typing import Annotated
 import typer
 
 from backend.errors import InputError
+from cockpit.cli_along import along
 from cockpit.cli_entry import (
     Cert,
     InsecureHttp,
@@ -320,6 +321,7 @@ app.command()(convert)
 app.command()(export)
 app.command()(gauge)
 app.command()(track)
+app.command()(along)
 
 
 def _interrupted() -> threading.Event:

@@ -22,7 +22,8 @@ from backend.safety.partner import Limits
 from backend.shell.hub import Hub
 from backend.shell.image_loops import ImageLoop
 from backend.shell.image_worker import ImageWorker
-from backend.shell.kinds import EXACT, REGIONS, SUN, ZONE, Recipe, Wishes
+from backend.shell.kinds import ALONG, EXACT, REGIONS, SUN, ZONE, Made, Recipe, Wishes
+from backend.shell.recent import Recent
 from backend.site.bodies import site_bodies
 from backend.site.site import Site
 from backend.spatial.types import Array
@@ -33,6 +34,9 @@ if TYPE_CHECKING:
 MAX_HEIGHT = 50.0  # of a picked bucket tip above or below the swing joint [m]
 _LOOPS = (("images", (SUN, EXACT), "image_hz"), ("zones", (ZONE, REGIONS), "zone_hz"))
 """Name, kinds, and which of the site's rates; each loop has a process of its own."""
+
+ALONG_HZ = 0.5
+"""How often strips along tracks are made, while somebody looks at them."""
 
 SHARED = frozenset({"marker", "silence", "tip_height", "playback"})
 """Kinds of messages that change what others see; the rest is of the page that sends it."""
@@ -94,8 +98,34 @@ def image_loops(site: Site, config: Config, closing: contextlib.ExitStack) -> tu
     return tuple(loops)
 
 
+def along_loops(site: Site, config: Config, closing: contextlib.ExitStack) -> tuple[ImageLoop, ...]:
+    """The loop that makes strips along tracks; none on a site without."""
+    if not (site.gauge.track or site.gauge.source):
+        return ()
+    # Only a site with tracks loads what makes them.
+    from backend.site.travel import site_ways
+
+    ways = site_ways(site)
+    if not ways:
+        return ()
+    sun = SunParameters(site.sun.m, site.sun.n, site.sun.eta)
+    worker = ImageWorker(Recipe(config, sun, (ALONG,), ways=ways))
+    closing.callback(worker.close)
+    return (ImageLoop(ALONG, ALONG_HZ, WhenAsked(worker)),)
+
+
+class WhenAsked:
+    """Starts a worker's process only once somebody looks at what it makes."""
+
+    def __init__(self, worker: ImageWorker) -> None:
+        self._worker = worker
+
+    def make(self, snapshot: Snapshot, wishes: Wishes) -> list[Made]:
+        return self._worker.make(snapshot, wishes) if wishes.recent else []
+
+
 class Desk:
-    """Answers pages: what-if, ghosts, cameras, heights of reach images.
+    """Answers pages: what-if, ghosts, cameras, heights of reach images, strips along tracks.
 
     view: the 3D scene's, None while it starts; action: told what an operator did, on which
     page, with what details; ready: whether what judges postures is loaded.
@@ -115,10 +145,11 @@ class Desk:
         self._action = action
         self._ready = ready
         self._tip_heights: dict[str, float] = {}
+        self.recent = Recent()
 
     def wishes(self) -> Wishes:
         """What operators chose of the images."""
-        return Wishes(dict(self._tip_heights))
+        return Wishes(dict(self._tip_heights), self.recent.wanted())
 
     def what_if(self, own: str, joints: dict[str, float]) -> dict[str, Any]:
         """python-fcl's verdict on a posture of `own`; joints that are not named stay."""
@@ -144,6 +175,10 @@ class Desk:
         page, name = message.get("page"), message.get("name", message.get("machine"))
         kind = message.get("type")
         if not (page is None or isinstance(page, str)):
+            return
+        if kind == "along":  # again and again while it is looked at: nothing to record
+            if isinstance(name, str) and name in self._config.own:
+                self.recent.ask(name)
             return
         if isinstance(kind, str):
             self._action(kind, page, message)

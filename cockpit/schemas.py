@@ -14,6 +14,7 @@ from backend.documents.access import (
     UsersFileDocument,
 )
 from backend.documents.alarms import AlarmsDocument
+from backend.documents.along import AlongDocument
 from backend.documents.assessment import AssessmentDocument
 from backend.documents.bench import BenchDocument
 from backend.documents.conversion import ConversionDocument, ExportDocument
@@ -32,6 +33,7 @@ SCHEMAS: dict[str, tuple[type[BaseModel], str]] = {
     "assess": (AssessmentDocument, "what assess prints"),
     "cspace": (CspaceDocument, "what cspace --json prints"),
     "gauge": (GaugeDocument, "what gauge --json prints"),
+    "along": (AlongDocument, "what along --json prints"),
     "convert": (ConversionDocument, "what convert --json prints"),
     "export": (ExportDocument, "what export --json prints"),
     "bench": (BenchDocument, "what bench --json prints"),

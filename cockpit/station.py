@@ -33,7 +33,7 @@ from backend.shell.runner import Runner
 from backend.shell.session.recorder import Recorder
 from backend.site.site import Site
 from cockpit.cameras import make_cameras, whep_origins
-from cockpit.desk import Desk, image_loops, load_models, make_config, may_say
+from cockpit.desk import Desk, along_loops, image_loops, load_models, make_config, may_say
 from cockpit.driving import make_driving
 from cockpit.options import Options
 from cockpit.recording import make_recorder, recording_sources, site_folder
@@ -101,7 +101,10 @@ class Station:
         self._closing.callback(self.driving.shut)
         self.runner = Runner(
             self.config,
-            image_loops(site, self.config, self._closing),
+            (
+                *image_loops(site, self.config, self._closing),
+                *along_loops(site, self.config, self._closing),
+            ),
             LinkSource(self.receiver, self.recorder.hear),
             self.hub,
             site.rates.step_hz,
@@ -202,6 +205,7 @@ class Station:
                 # The view must outlive it; without commands every machine stands by itself.
                 self._driving_failure = f"driving stopped: {error!r}"
                 log.exception("%s", self._driving_failure)
+        self._desk.recent.keep(snapshot)
         self.alarm_log.after_cycle(snapshot)
         self.recorder.after_cycle(inputs, snapshot)
 

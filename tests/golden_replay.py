@@ -21,7 +21,7 @@ from cockpit.desk import load_models, make_config
 ROOT = Path(__file__).resolve().parents[1]
 SESSIONS = ROOT / "scenes" / "sessions"
 GOLDEN = ROOT / "tests" / "golden"
-SITES = {"near-miss": "demo", "sun2020-experiment": "sun2020-experiment"}
+SITES = {"near-miss": "demo", "sun2020-experiment": "sun2020-experiment", "ballast": "ballast"}
 
 DISTANCE, ANGLE = 1e-5, 1e-6
 """Tolerances [m], [rad]: rounding of another processor's arithmetic, nothing that is seen."""

@@ -50,7 +50,7 @@ ROOMS: dict[str, set[str]] = {
     "backend.shell": {"backend"},
     "backend.warm": {
         *("backend.pipeline", "backend.planning", "backend.cspace", "backend.collision"),
-        *("backend.machine", "backend.safety", "backend.spatial"),
+        *("backend.machine", "backend.safety", "backend.site", "backend.spatial"),
     },
     "cockpit": {"backend", "cockpit"},
 }

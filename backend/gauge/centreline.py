@@ -76,12 +76,18 @@ class InFrame:
     it has none.
     """
 
-    def __init__(self, line: Centreline, origin: Array, height: float | None = None) -> None:
+    def __init__(
+        self,
+        line: Centreline,
+        origin: Array,
+        height: float | None = None,
+        assumed: bool = False,
+    ) -> None:
         """origin: (3,) of the frame, in the line's [m]; height: in the frame [m], of stations whose
-        own is not finite.
+        own is not finite; assumed: whether that height is nobody's word.
         """
         self.name, self.state, self.gauge = line.name, line.state, line.gauge
-        self.length = line.length
+        self.length, self.assumed = line.length, assumed
         self._line, self._origin, self._height = line, np.asarray(origin), height
 
     def at(self, s: Array) -> PointStations:
@@ -94,6 +100,12 @@ class InFrame:
             gradient = np.where(unknown, 0.0, gradient)
         lift = getattr(at, "lift", None)
         return PointStations(xyz, at.heading, gradient, at.cant, at.curvature, lift)
+
+    def as_told(self) -> InFrame:
+        """The same line, its height NaN where it has none of its own."""
+        told = InFrame(self._line, self._origin)
+        told.name, told.state = self.name, self.state
+        return told
 
 
 class LineThroughPoints:

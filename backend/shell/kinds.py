@@ -8,18 +8,22 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
 
 from backend.pipeline.config import Config
 from backend.pipeline.images import SunParameters, ordered_pairs, pair_image
 from backend.pipeline.records import Snapshot
+from backend.shell.recent import SPAN
 
 if TYPE_CHECKING:
     from backend.pipeline.exact import Cells
+    from backend.site.travel import Way
 
-SUN, EXACT, ZONE, REGIONS = "sun", "exact", "zone", "regions"
+SUN, EXACT, ZONE, REGIONS, ALONG = "sun", "exact", "zone", "regions", "along"
 
 
 class Image(Protocol):
@@ -34,9 +38,12 @@ class Image(Protocol):
 
 @dataclass(frozen=True)
 class Wishes:
-    """What operators chose. tip_heights: of the reach images, by machine [m]."""
+    """What operators chose. tip_heights: of the reach images, by machine [m]; recent: postures of
+    the last seconds, the oldest first, of the machines whose strip along the track is looked at.
+    """
 
     tip_heights: Mapping[str, float]
+    recent: Mapping[str, tuple[tuple[float, ...], ...]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -52,13 +59,14 @@ class Made:
 class Recipe:
     """Kinds that are made together, one after the other. Plain data, for another process.
 
-    cells: None for the usual number.
+    cells: None for the usual number; ways: the site's tracks.
     """
 
     config: Config
     sun: SunParameters
     kinds: tuple[str, ...]
     cells: Cells | None = None
+    ways: tuple[Way, ...] = ()
 
 
 def make_images(recipe: Recipe, snapshot: Snapshot, wishes: Wishes) -> list[Made]:
@@ -76,6 +84,8 @@ def _makers(
     kind: str, recipe: Recipe, snapshot: Snapshot, wishes: Wishes
 ) -> list[Callable[[], Image]]:
     config = recipe.config
+    if kind == ALONG:
+        return _along(recipe, snapshot, wishes)
     if kind in (SUN, ZONE):
         pairs = ordered_pairs(snapshot, config)
         if kind == ZONE:
@@ -92,3 +102,16 @@ def _makers(
         return [partial(regions_image, snapshot, config, own) for own in machines]
     cells, heights = recipe.cells or Cells(), wishes.tip_heights
     return [partial(own_image, snapshot, config, own, cells, heights.get(own)) for own in machines]
+
+
+def _along(recipe: Recipe, snapshot: Snapshot, wishes: Wishes) -> list[Callable[[], Image]]:
+    """Strips of the machines that are looked at and stand on a track."""
+    from backend.pipeline.along import along_image, own_way
+
+    found: list[Callable[[], Image]] = []
+    for own, recent in wishes.recent.items():
+        way = own_way(snapshot, recipe.ways, own) if own in recipe.config.own else None
+        if way is not None and recent:
+            postures = np.array(recent)
+            found.append(partial(along_image, snapshot, recipe.config, own, way, postures, SPAN))
+    return found

@@ -71,7 +71,7 @@ def _tracks(site: Site, source: GaugeSource, model: Model, taken: set[str]) -> I
         name = alignment.name.strip()
         if not _matches(source.tracks, name):
             continue
-        line = InFrame(alignment, origin, height)
+        line = InFrame(alignment, origin, height, assumed=source.height is None)
         line.name, line.state = _free(name, taken), alignment.state or EXISTING
         yield Track(line)
 

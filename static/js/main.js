@@ -22,6 +22,7 @@ import { slices } from "./plots/slices.js";
 import { bars } from "./plots/bars.js";
 import { limits } from "./plots/limits.js";
 import { trends } from "./plots/trends.js";
+import * as along from "./plots/along.js";
 import { timeline } from "./plots/timeline.js";
 import * as player from "./player.js";
 import * as session from "./session.js";
@@ -142,6 +143,7 @@ player.startPlayer(socket.send);
 transport.startTransport();
 recording.startRecording();
 startSeries(plots.trends);
+along.startAlong(socket.send, () => Object.assign(plots.trends, { dirty: true, last: -Infinity }));
 drive.startDriving(socket.send);
 
 function onFrame(header, arrays) {
@@ -160,6 +162,8 @@ function onFrame(header, arrays) {
     for (const s of live) s.dirty = true;
     // After a jump an image can be right again that was of another time.
     if (partner !== state.partner || (replaying() && before?.time !== header.time)) for (const s of images) s.dirty = true;
+  } else if (header.type === "along") {
+    plots.trends.dirty = true;
   } else if (header.type === "exact" ? header.own === state.own : header.key === `${state.own}<-${state.partner}`) {
     for (const s of replaying() ? [...images, plots.bars, plots.plan] : images) s.dirty = true;
   }
@@ -170,6 +174,7 @@ function tick() {
   watermark.update();
   session.refresh();
   transport.update();
+  along.update();
   sheets.update();
   recording.update();
   drive.update();
@@ -186,7 +191,7 @@ function tick() {
   heads.plan.who(`${subject}`);
   heads.reach.who(subject);
   for (const name of ["bars", "limits"]) heads[name].who(subject);
-  heads.trends.who(state.partner ? `${subject} ↔ ${label(state.partner)}` : subject);
+  heads.trends.who(state.partner && !along.shown() ? `${subject} ↔ ${label(state.partner)}` : subject);
   for (const name of ["scene", "plan", "bars", "limits", "trends", "timeline"]) heads[name].age(age);
   const forced = Boolean(present) && imageStale(present);
   for (const name of ["reach", "slice-0", "slice-1", "slice-2"]) heads[name].age(present || far() === null ? old : age, forced);

@@ -15,6 +15,7 @@ export const state = {
   images: new Map(), // Sun's: "left<-right" -> {header, arrays, arrival, serial}
   exact: new Map(), // "left" -> the same
   zones: new Map(), // "left<-right" -> the same
+  along: new Map(), // "left" -> the same: the strip along its track
   own: null,
   partner: null,
   socket: "connecting",
@@ -26,7 +27,7 @@ export const state = {
   delays: [], // from the server's clock to arrival here [s]
 };
 
-const KINDS = { sun: "images", exact: "exact", zone: "zones" };
+const KINDS = { sun: "images", exact: "exact", zone: "zones", along: "along" };
 let minimumDelay = Infinity;
 
 export const mode = () => state.snapshot?.mode ?? state.site?.mode ?? "";

@@ -1,5 +1,6 @@
 // The bar below the page in PLAYBACK: buttons, clock, status. Keys are in keys.js.
 
+import { shown as along } from "./plots/along.js";
 import { $, mark, slowText, write } from "./words.js";
 import { number } from "./axis.js";
 import { clock, day, wallClock } from "./clock.js";
@@ -58,8 +59,8 @@ export function update() {
   const on = replaying();
   $("transport").hidden = !on;
   $("trends-tools").hidden = !on;
-  $("regions").hidden = on;
-  write($("trends-title"), on ? "Session" : "Last 60 s");
+  $("regions").hidden = on || along();
+  if (on || !along()) write($("trends-title"), on ? "Session" : "Last 60 s");
   $("timeline").setAttribute("role", on ? "slider" : "img");
   const p = player.playback();
   if (!p) return;

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import shapely
@@ -18,8 +18,11 @@ from backend.pipeline.images import PairImage, frame_arrays
 from backend.pipeline.regions import RegionsImage
 from backend.pipeline.zones import ZoneImage
 from backend.shell.app.wire import encode
-from backend.shell.kinds import EXACT, REGIONS, SUN, ZONE
+from backend.shell.kinds import ALONG, EXACT, REGIONS, SUN, ZONE
 from backend.spatial.types import AnyArray
+
+if TYPE_CHECKING:
+    from backend.pipeline.along import AlongImage
 
 NEAR_LIMIT, BEYOND_LIMIT, OUT_OF_REACH = 8, 16, 32
 """Bits of a reach cell beside the layers' own."""
@@ -136,6 +139,42 @@ def zone_frame(image: ZoneImage) -> bytes:
     return encode(header, arrays)
 
 
+def along_frame(image: AlongImage) -> bytes:
+    """Arrays `edges` (k, 2) float32 stations [m], `clearance` and `at_least` (k,) float32 [m], NaN
+    where there is none.
+    """
+    # A site without tracks loads nothing of this.
+    from backend.documents.along import bands, limit_of, part_of
+
+    place, items = image.place, image.stretches
+    header = {
+        "type": ALONG,
+        "key": image.key,
+        "own": image.own,
+        "track": image.track,
+        "state_time": image.state_time,
+        "length": image.length,
+        "station": None if place is None else place.station,
+        "eta": image.eta,
+        "cap": image.cap,
+        "seconds": image.seconds,
+        "postures": image.postures,
+        "reason": image.reason,
+        "bands": [band.model_dump() for band in bands(items)],
+        "closest": [f"{part_of(i.body)} ↔ {limit_of(i.limit)}" if i.body else "" for i in items],
+    }
+    arrays: dict[str, AnyArray] = {
+        "edges": np.array([(i.start, i.end) for i in items], dtype=np.float32).reshape(-1, 2),
+        "clearance": np.array([_finite(i.clearance) for i in items], dtype=np.float32),
+        "at_least": np.array([i.at_least for i in items], dtype=np.float32),
+    }
+    return encode(header, arrays)
+
+
+def _finite(value: float) -> float:
+    return value if math.isfinite(value) else math.nan
+
+
 def rings(zone: BaseGeometry) -> tuple[AnyArray, AnyArray]:
     """(k, 2) float32 vertices of all rings of (multi)polygons, (r, 2) int32 sizes and kinds."""
     vertices, sizes = [], []
@@ -154,6 +193,8 @@ def frame_of(kind: str, image: Any, images: Mapping[tuple[str, str], Any]) -> by
         return sun_frame(image)
     if kind == EXACT:
         return exact_frame(image, images.get((REGIONS, image.key)))
+    if kind == ALONG:
+        return along_frame(image)
     return zone_frame(image) if kind == ZONE else None
 
 

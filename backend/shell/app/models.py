@@ -260,7 +260,10 @@ class BackendModel(BaseModel):
     step: TimingModel = Field(description="the fast loop: fusion, distances, concerns")
     images: TimingModel = Field(description="the image loop: Sun's sets and the exact images")
     zones: TimingModel = Field(description="the loop of driving zones and free regions")
-    failure: str = Field(description="empty while both loops run")
+    along: TimingModel | None = Field(
+        default=None, description="the loop of strips along tracks, on a site with tracks"
+    )
+    failure: str = Field(description="empty while all loops run")
 
 
 class DemoModel(BaseModel):

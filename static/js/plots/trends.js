@@ -8,6 +8,7 @@ import { $ } from "../words.js";
 import { label as nameOf, replaying, silence, snapshotAge, state } from "../state.js";
 import { surface } from "../surface.js";
 import { ageText } from "../head.js";
+import * as along from "./along.js";
 import * as series from "./series.js";
 
 const SPAN = 60;
@@ -108,5 +109,6 @@ function probe(x, y) {
   return lines;
 }
 
-/** Live the last minute; of a recorded session whatever part of it is asked for. */
-export const trends = () => surface($("trends"), (...given) => (replaying() ? series.paint : paint)(...given), (x, y) => (replaying() ? series.probe : probe)(x, y));
+/** Live the last minute, or the strip along the track; of a recorded session whatever part of it is asked for. */
+const shown = () => (replaying() ? series : along.shown() ? along : { paint, probe });
+export const trends = () => surface($("trends"), (...given) => shown().paint(...given), (x, y) => shown().probe(x, y));
