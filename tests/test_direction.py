@@ -34,6 +34,7 @@ ROOMS: dict[str, set[str]] = {
         *("backend.safety", "backend.collision", "backend.machine", "backend.spatial"),
         "backend.errors",
     },
+    "backend.perception": {"backend.spatial", "backend.errors"},
     "backend.tracking": {"backend.spatial", "backend.errors"},
     "backend.control": {
         *("backend.safety", "backend.machine", "backend.spatial", "backend.errors"),
@@ -78,7 +79,7 @@ LIBRARIES: dict[str, str | tuple[str, ...]] = {
 IMPURE = {"time", "random", "threading", "logging", "asyncio", "socket", "subprocess", "requests"}
 PURE = {
     *("spatial", "collision", "control", "cspace", "fusion", "gauge", "safety", "planning"),
-    *("pipeline", "tracking"),
+    *("perception", "pipeline", "tracking"),
 }
 
 

@@ -1,0 +1,1 @@
+"""From points of LiDARs to boxes of people and objects."""
