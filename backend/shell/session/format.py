@@ -30,6 +30,7 @@ METADATA = "cockpit"  # name of the metadata record, the first after the file's 
 OWN = "/cockpit/"
 CYCLE, CLOCK, SNAPSHOT = "/cockpit/cycle", "/cockpit/clock", "/cockpit/snapshot"
 ALARM, ACTION, MARKER = "/cockpit/alarm", "/cockpit/action", "/cockpit/marker"
+GAUGE = "/cockpit/gauge"
 
 _NUMBER, _TEXT, _COUNT = {"type": "number"}, {"type": "string"}, {"type": "integer", "minimum": 0}
 _COUNTS = {
@@ -68,6 +69,8 @@ SCHEMAS: dict[str, dict[str, Any]] = {
         {"machine": _TEXT, "sent": _NUMBER, "remote": _NUMBER, "received": _NUMBER},
         {},
     ),
+    # what operators chose of the working gauge, when it changed and once a second, site frame [m]
+    GAUGE: _object("GaugeChoice", {"drawn": {"type": "array"}, "switched": {"type": "object"}}, {}),
     SNAPSHOT: _object("Snapshot", {"time": _NUMBER, "cycle": _COUNT, "machines": {}}, {}),
     ALARM: _object("Alarms", {"alarms": {"type": "array"}}, {}),
     # what an operator did on a page
