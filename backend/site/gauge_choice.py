@@ -21,8 +21,9 @@ Corner: TypeAlias = tuple[float, float]
 
 KINDS: tuple[str, ...] = get_args(DrawnKind)
 NAME = r"[^\W_][\w .-]{0,31}"
-MOST_AREAS, MOST_CORNERS, LEAST_AREA = 50, 60, 0.01
-"""Areas drawn on a site, corners of one, and the smallest that is one [m²]."""
+MOST_AREAS, MOST_CORNERS, MOST_IN_ALL, LEAST_AREA = 50, 40, 400, 0.01
+"""Areas drawn on a site, corners of one and of all, and the smallest that is one [m²]. What is made
+of 40 corners takes a second at worst, and is made anew at every start."""
 FARTHEST = 1.0e5
 """Of a corner or height from the site's origin [m]."""
 
@@ -94,6 +95,11 @@ def checked(choice: GaugeChoice, taken: Collection[str] = ()) -> GaugeChoice:
     """
     if len(choice.drawn) > MOST_AREAS:
         raise InputError(f"gauge: {len(choice.drawn)} areas are drawn; allowed are {MOST_AREAS}.")
+    corners = sum(len(area.polygon) for area in choice.drawn)
+    if corners > MOST_IN_ALL:
+        raise InputError(
+            f"gauge: the areas have {corners} corners in all; allowed are {MOST_IN_ALL}."
+        )
     seen: set[str] = set()
     for area in choice.drawn:
         _check_area(area)

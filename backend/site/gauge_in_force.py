@@ -60,9 +60,9 @@ def own_tracks(
 
     leaving = replace(DEFAULT_OPTIONS, **LEAVES)
     found = []
-    for volume in tracks:
-        center, radius = volume.sphere
-        if np.linalg.norm(center - position) <= radius + leaving.offset + leaving.rise:
+    x, y = float(position[0]), float(position[1])
+    for volume, (west, south, east, north) in tracks:
+        if west <= x <= east and south <= y <= north:
             options = leaving if volume.name in before else DEFAULT_OPTIONS
             if stands_on(volume, position, heading, options):
                 found.append(volume.name)
@@ -70,14 +70,21 @@ def own_tracks(
 
 
 @lru_cache(maxsize=16)
-def _tracks(bodies: ByIdentity[SiteBodies]) -> tuple[LimitVolume, ...]:
-    site = bodies.value
-    skipped = {*site.idle, *site.always}
-    return tuple(
-        v
-        for v in site.volumes
-        if v.kind == "track" and v.axis is not None and v.name not in skipped
-    )
+def _tracks(
+    bodies: ByIdentity[SiteBodies],
+) -> tuple[tuple[LimitVolume, tuple[float, float, float, float]], ...]:
+    """Those that may be left out, each with where a machine's base is on it at most: from west to
+    east, from south to north [m].
+    """
+    site, beside = bodies.value, LEAVES["offset"]
+    found = []
+    for volume in site.volumes:
+        skipped = volume.name in site.idle or volume.name in site.always
+        if volume.kind == "track" and volume.axis is not None and not skipped:
+            (west, south), (east, north) = volume.axis[:, :2].min(0), volume.axis[:, :2].max(0)
+            around = west - beside, south - beside, east + beside, north + beside
+            found.append((volume, around))
+    return tuple(found)
 
 
 @lru_cache(maxsize=32)

@@ -131,7 +131,7 @@ def test_an_operator_draws_switches_and_erases(yard: Yard, who: str) -> None:
 @pytest.mark.parametrize(
     ("method", "path", "body", "said"),
     [
-        ("POST", "/drawn", {**AREA, "polygon": SQUARE[:2]}, "has 2 corners; allowed are 3 to 60"),
+        ("POST", "/drawn", {**AREA, "polygon": SQUARE[:2]}, "has 2 corners; allowed are 3 to 40"),
         (
             "POST",
             "/drawn",

@@ -67,8 +67,8 @@ def held(site: SiteBodies) -> set[str]:
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"polygon": SQUARE[:2]}, "has 2 corners; allowed are 3 to 60"),
-        ({"polygon": tuple((math.cos(k), math.sin(k)) for k in range(61))}, "has 61 corners"),
+        ({"polygon": SQUARE[:2]}, "has 2 corners; allowed are 3 to 40"),
+        ({"polygon": tuple((math.cos(k), math.sin(k)) for k in range(41))}, "has 41 corners"),
         ({"polygon": (SQUARE[0], SQUARE[2], SQUARE[1], SQUARE[3])}, "crosses itself"),
         ({"polygon": ((0.0, 0.0), (1.0, 1.0), (2.0, 2.0))}, "crosses itself or encloses nothing"),
         ({"polygon": ((0.0, 0.0), (0.1, 0.0), (0.1, 0.1))}, "encloses 0.01 m² or less"),
@@ -104,8 +104,11 @@ def test_names_are_different_and_areas_are_counted() -> None:
     checked(GaugeChoice(many[1:]))
     with pytest.raises(InputError, match="51 areas are drawn; allowed are 50"):
         checked(GaugeChoice(many))
-    round_one = tuple((math.cos(k / 9.6), math.sin(k / 9.6)) for k in range(MOST_CORNERS))
-    checked(GaugeChoice((replace(PIT, polygon=round_one),)))
+    round_one = tuple((math.cos(k / 6.4), math.sin(k / 6.4)) for k in range(MOST_CORNERS))
+    rounds = tuple(replace(PIT, name=f"pit{k}", polygon=round_one) for k in range(11))
+    checked(GaugeChoice(rounds[1:]))
+    with pytest.raises(InputError, match="the areas have 440 corners in all; allowed are 400"):
+        checked(GaugeChoice(rounds))
 
 
 def test_changes_leave_the_record_before_alone() -> None:

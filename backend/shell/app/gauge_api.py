@@ -21,7 +21,7 @@ class ShapeRequest(BaseModel):
 
     kind: DrawnKind = Field(description="stay out of it, or stay in it")
     polygon: list[tuple[float, float]] = Field(
-        max_length=1000, description="3 to 60 corners in order, east and north [m]"
+        max_length=1000, description="3 to 40 corners in order, east and north [m]"
     )
     bottom: float | None = Field(None, description="height; null only of a keep-in area [m]")
     top: float | None = Field(None, description="height; null only of a keep-in area [m]")

@@ -10,8 +10,10 @@ time t [s] of the monotonic clock becomes `stamp(t)` and comes back bit by bit b
 so that a replay sees exactly what the live pipeline saw.
 
 Order. The messages that a cycle of the pipeline consumed stand before the `/cockpit/cycle`
-message of that cycle. A replay hands them to the pipeline in just these portions; a recording
-without cycles (of a ROS 2 machine) is replayed in portions of one period.
+message of that cycle, what operators chose of the working gauge among them: it is written when it
+changes and once a second, so that whoever plays a part of a recording knows it within a second. A
+replay hands them to the pipeline in just these portions; a recording without cycles (of a ROS 2
+machine) is replayed in portions of one period.
 """
 
 from __future__ import annotations
