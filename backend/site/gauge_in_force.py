@@ -22,9 +22,9 @@ from backend.spatial.types import Array
 if TYPE_CHECKING:
     from backend.gauge.volumes import LimitVolume
 
-LEAVES = {"offset": 0.75, "rise": 1.5, "turn": math.radians(20.0)}
+OFFSET, RISE, TURN = 0.75, 1.5, math.radians(20.0)
 """A machine is on a track by `choose.Options` (0.5 m beside it, 1 m above or below, 15° off) and
-leaves it only beyond these: a position's noise does not put it on and off the track."""
+leaves it only beyond these [m, m, rad]: a position's noise does not put it on and off the track."""
 OFF = "is switched off"
 
 
@@ -58,7 +58,7 @@ def own_tracks(
         return ()
     from backend.gauge.choose import DEFAULT_OPTIONS, stands_on
 
-    leaving = replace(DEFAULT_OPTIONS, **LEAVES)
+    leaving = replace(DEFAULT_OPTIONS, offset=OFFSET, rise=RISE, turn=TURN)
     found = []
     x, y = float(position[0]), float(position[1])
     for volume, (west, south, east, north) in tracks:
@@ -76,13 +76,13 @@ def _tracks(
     """Those that may be left out, each with where a machine's base is on it at most: from west to
     east, from south to north [m].
     """
-    site, beside = bodies.value, LEAVES["offset"]
+    site = bodies.value
     found = []
     for volume in site.volumes:
         skipped = volume.name in site.idle or volume.name in site.always
         if volume.kind == "track" and volume.axis is not None and not skipped:
             (west, south), (east, north) = volume.axis[:, :2].min(0), volume.axis[:, :2].max(0)
-            around = west - beside, south - beside, east + beside, north + beside
+            around = west - OFFSET, south - OFFSET, east + OFFSET, north + OFFSET
             found.append((volume, around))
     return tuple(found)
 
