@@ -12,7 +12,7 @@ import { surface } from "../surface.js";
 import {
   base, chart, circles, drawZone, exitArrow, gauge, gridLines, gridText, iso, nearestLine, north, obstacles, outlines, wedge, zonePoints,
 } from "./plan_layers.js";
-import { paint as paintDrawing } from "../gauge/drawing.js";
+import { drawing, paint as paintDrawing } from "../gauge/drawing.js";
 import { inForce } from "../gauge/model.js";
 import { distanceText, drawZones, outlineSun, view as zoneView, zoneExit, zoneLegend, zoneLines, zoneNote } from "./plan_zone.js";
 
@@ -113,7 +113,7 @@ function paint(g, width, height, dpr) {
 
 function probe(x, y) {
   const own = machine(state.own);
-  if (!box || !own || x < box.left || x > box.right || y < box.top || y > box.bottom) return null;
+  if (!box || !own || drawing() || x < box.left || x > box.right || y < box.top || y > box.bottom) return null;
   const [e, n] = chart.back(x, y);
   const origin = state.site?.frame?.origin ?? [0, 0, 0];
   const lines = [`E ${(e + origin[0]).toFixed(1)} m, N ${(n + origin[1]).toFixed(1)} m`];
