@@ -12,7 +12,7 @@ import pytest
 from live import Backend, all_valid, backend
 from watched import SIZES, Watch
 
-pytestmark = [pytest.mark.browser, pytest.mark.processes, pytest.mark.timeout(400)]
+pytestmark = [pytest.mark.browser, pytest.mark.processes, pytest.mark.timeout(600)]
 
 # Around RAIL, far from the other machine: north-west, in the site frame [m].
 CORNERS = [(-6.0, -2.5), (-1.0, -2.5), (-1.0, 2.5), (-6.0, 2.5)]

@@ -8,9 +8,6 @@ const AGAIN = 2000; // ms after a failure
 let held = null; // a GaugeStateDocument
 let busy = false;
 let failed = -Infinity;
-const listeners = [];
-
-export const onChange = (listener) => listeners.push(listener);
 
 /** Whether this server knows what holds now. */
 export const known = () => Boolean(state.snapshot?.gauge);
@@ -27,7 +24,6 @@ export const standingOn = (name) => Object.entries(state.snapshot?.gauge?.own_tr
 
 export function take(document) {
   held = document;
-  for (const listener of listeners) listener();
 }
 
 /** Another site, or another server. */

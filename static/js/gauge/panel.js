@@ -41,6 +41,8 @@ function reason(volume) {
   return `in force${volume.switched ? ", switched on" : ""}${on.length ? `; ${on.join(" and ")} ${on.length > 1 ? "stand" : "stands"} on it` : ""}`;
 }
 
+const told = (volume) => `${WORDS[volume.kind] ?? volume.kind} · ${reason(volume)}`;
+
 function buttons(volume) {
   if (!mayChange()) return [];
   const one = (word, on) => {
@@ -56,7 +58,7 @@ function buttons(volume) {
 
 function rows() {
   return model.volumes().map((volume) => make("tr", { "data-name": volume.name, "data-held": volume.idle ? "0" : "1" },
-    make("td", { text: volume.name }), make("td", { text: `${WORDS[volume.kind] ?? volume.kind} · ${reason(volume)}` }), make("td", {}, ...buttons(volume))));
+    make("td", { text: volume.name }), make("td", { text: told(volume) }), make("td", {}, ...buttons(volume))));
 }
 
 function hint() {
@@ -115,7 +117,6 @@ export function closeGauge() {
 
 export function startGauge() {
   drawing.startDrawing(drawingChanged);
-  model.onChange(() => { built = ""; });
   $("gauge-open").addEventListener("click", () => ($("gauge").open ? closeGauge() : openGauge()));
   $("gauge-close").addEventListener("click", closeGauge);
   $("gauge-out").addEventListener("click", () => drawing.begin("keep_out"));
@@ -145,8 +146,13 @@ export function update() {
   if (!open) return undefined;
   for (const id of ["gauge-out", "gauge-in"]) $(id).hidden = !mayChange();
   write($("gauge-hint"), hint());
-  const key = JSON.stringify([mayChange(), model.volumes().map((v) => [v.name, v.kind, v.idle, v.switched, v.drawn]), state.snapshot?.gauge?.own_tracks]);
-  if (key === built) return undefined;
+  const volumes = model.volumes();
+  const key = JSON.stringify([mayChange(), volumes.map((v) => [v.name, v.kind, v.idle, v.switched, v.drawn])]);
+  if (key === built) {
+    // Who stands on a track can change at any time: a button being pressed stays where it is.
+    volumes.forEach((volume, k) => write($("gauge-list").rows[k].cells[1], told(volume)));
+    return undefined;
+  }
   built = key;
   const focused = document.activeElement?.getAttribute("aria-label");
   $("gauge-list").replaceChildren(...rows());
