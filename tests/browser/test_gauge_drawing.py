@@ -98,7 +98,7 @@ def test_an_area_is_drawn_holds_and_goes(ballast: Backend, watch: Watch, artifac
     running.wait_for(judged, 60.0)
     assert (
         page.evaluate(
-            """() => [...document.querySelectorAll("#gauge *, #plan-panel > header *")]
+            """() => [...document.querySelectorAll("#gauge *, #plan-panel > header button *")]
           .filter(n => n.children.length === 0 && n.checkVisibility()
             && n.scrollWidth > n.clientWidth + 1 && n.clientWidth > 0)
           .map(n => n.id || n.textContent)"""
