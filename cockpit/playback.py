@@ -25,6 +25,7 @@ from backend.pipeline.config import Config
 from backend.pipeline.records import Snapshot
 from backend.shell.app.app import Sources, create_app
 from backend.shell.app.feed import Frames
+from backend.shell.app.gauge_api import gauge_router
 from backend.shell.app.server import WebServer, bind
 from backend.shell.app.session_api import session_router
 from backend.shell.app.viewer_proxy import Hooks, viewer_router
@@ -32,6 +33,7 @@ from backend.shell.hub import Hub
 from backend.shell.image_loops import ImageLoops
 from backend.shell.session.cycles import Topics
 from backend.shell.session.index import Index
+from backend.shell.session.played_gauge import PlayedGauge
 from backend.shell.session.player import MODE, Player
 from backend.shell.session.reader import Session, open_session
 from backend.shell.session.ring import parts_of, pins_of, recordings_of
@@ -198,7 +200,7 @@ class PlaybackStation:
             sources,
             viewer_router(lambda: None if self.view is None else self.view.port, hooks, HEAD),
             hosts=options.entry.hosts,
-            routers=(session_router(self),),
+            routers=(session_router(self), gauge_router(PlayedGauge(self.config, self.hub))),
             access=access,
         )
         self.web = WebServer(app, listener, options.entry.tls)

@@ -20,6 +20,7 @@ from backend.documents.bench import BenchDocument
 from backend.documents.conversion import ConversionDocument, ExportDocument
 from backend.documents.cspace import CspaceDocument
 from backend.documents.gauge import GaugeDocument
+from backend.documents.gauge_choice import GaugeChoiceFile, GaugeStateDocument
 from backend.documents.recordings import RecordingsDocument, RecoverDocument
 from backend.documents.session import DiffDocument, SeriesDocument, SessionDocument
 from backend.documents.state import StateDocument
@@ -34,6 +35,8 @@ SCHEMAS: dict[str, tuple[type[BaseModel], str]] = {
     "cspace": (CspaceDocument, "what cspace --json prints"),
     "gauge": (GaugeDocument, "what gauge --json prints"),
     "along": (AlongDocument, "what along --json prints"),
+    "gauge-choice": (GaugeChoiceFile, "what operators draw and switch, as it is kept"),
+    "gauge-state": (GaugeStateDocument, "/api/gauge"),
     "convert": (ConversionDocument, "what convert --json prints"),
     "export": (ExportDocument, "what export --json prints"),
     "bench": (BenchDocument, "what bench --json prints"),
@@ -60,7 +63,7 @@ def print_schema(name: str) -> None:
     """Prints one schema, or the names when `name` is empty."""
     if not name:
         for known, (_, what) in SCHEMAS.items():
-            print(f"{known:10} {what}")
+            print(f"{known:12} {what}")
         return
     if name not in SCHEMAS:
         raise InputError(f'schema: there is no "{name}"; allowed are {", ".join(SCHEMAS)}.')

@@ -16,14 +16,17 @@ from backend.documents.site import site_document
 from backend.documents.snapshot import snapshot_document
 from backend.errors import InputError
 from backend.pipeline.records import Inputs, Notice, Snapshot
+from backend.shell.access.places import state_folder
 from backend.shell.alarm_log import AlarmLog
 from backend.shell.app.app import Sources, create_app
 from backend.shell.app.cameras import camera_router
 from backend.shell.app.feed import Frames
+from backend.shell.app.gauge_api import gauge_router
 from backend.shell.app.metrics import metrics_router
 from backend.shell.app.server import WebServer, bind
 from backend.shell.app.viewer_proxy import Hooks, viewer_router
 from backend.shell.app.wire import dumps
+from backend.shell.gauge_desk import GaugeDesk
 from backend.shell.hub import Hub, OncePerSnapshot
 from backend.shell.link.receiver import Receiver
 from backend.shell.link.relay import Relay
@@ -95,6 +98,8 @@ class Station:
         self.alarm_log = AlarmLog(kept if recording else None, self.config.labels)
         self._closing.callback(self.alarm_log.close)
         self._desk = Desk(self.config, self.hub, lambda: self.view, self.recorder.action)
+        kept = state_folder() / "gauge" / f"{site.name}.json"
+        self.gauge = GaugeDesk(self.config, self.hub, kept, self._event)
         self.receiver = Receiver(session, prefixes, everything=self.recorder.wants_everything)
         self._closing.callback(self.receiver.close)
         self.driving = make_driving(site, self.config, session, self.receiver, self._event)
@@ -112,6 +117,7 @@ class Station:
             notices=self._notices,
             after_cycle=self._after_cycle,
             driven=self.driving.driven,
+            gauge=self.gauge.choice,
         )
         frames = Frames(self.hub, self.document)
         relay = Relay(session, self.hub, self._texts, frames.images)
@@ -141,6 +147,7 @@ class Station:
             routers=(
                 metrics_router(frames, self.backend, self._recorded, options.entry.metrics_token),
                 camera_router(make_cameras(site, session)),
+                gauge_router(self.gauge),
             ),
             access=access,
             streams=whep_origins(site),
@@ -210,7 +217,7 @@ class Station:
         self.recorder.after_cycle(inputs, snapshot)
 
     def _notices(self) -> tuple[Notice, ...]:
-        return self.recorder.notices() + self.alarm_log.notices()
+        return self.recorder.notices() + self.alarm_log.notices() + self.gauge.notices()
 
     def _event(self, what: str, who: str, details: dict[str, Any]) -> None:
         """What an operator did with a machine, for the recording and the audit log."""

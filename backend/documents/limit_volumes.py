@@ -25,7 +25,7 @@ def _volume(volume: LimitVolume, idle: str) -> dict[str, Any]:
         "state": volume.state,
         "rule": volume.rule,
         "idle": idle,
-        "plan": [_polygon(polygon) for polygon in volume.plan],
+        "plan": [polygon_document(polygon) for polygon in volume.plan],
         "boxes": [
             {
                 "center": boxes.centers[k].tolist(),
@@ -41,7 +41,8 @@ def _volume(volume: LimitVolume, idle: str) -> dict[str, Any]:
     }
 
 
-def _polygon(polygon: Polygon) -> dict[str, Any]:
+def polygon_document(polygon: Polygon) -> dict[str, Any]:
+    """Outline and holes."""
     return {
         "exterior": [[x, y] for x, y in polygon.exterior.coords],
         "holes": [[[x, y] for x, y in ring.coords] for ring in polygon.interiors],

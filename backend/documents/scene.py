@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from backend.machine.model import Machine
 from backend.pipeline.place import base_transform, place
 from backend.pipeline.records import Body3D
 from backend.pipeline.surroundings import Surroundings, surroundings
+from backend.site.gauge_in_force import left_out, own_tracks
 from backend.site.named_bodies import NO_SITE_BODIES, SiteBodies
 from backend.spatial.boxes import Boxes, concatenated
 from backend.spatial.types import Array
@@ -39,9 +40,11 @@ class Scene:
     site: SiteBodies
 
     def around(self, own: str) -> Surroundings:
-        """All that the machine `own` can touch, in its root frame."""
+        """All that the machine `own` can touch, in its root frame, but the track it stands on."""
         others = {n: (self.machines[n], body) for n, body in self.placed.items() if n != own}
-        return surroundings(self.machines[own], self.placed[own], others, self.site)
+        pose = self.poses[own]
+        site = left_out(self.site, own_tracks(self.site, pose.position, pose.yaw))
+        return surroundings(self.machines[own], self.placed[own], others, site)
 
     def eta(self, own: str) -> float:
         """3 sigma of the bodies of `own` and of the least certain other machine together [m]."""
@@ -79,11 +82,10 @@ def make_scene(
         np.array([o.rotation for o in state.obstacles]).reshape(n, 3, 3),
         np.array([o.half_extents for o in state.obstacles]).reshape(n, 3),
     )
-    bodies = SiteBodies(
-        concatenated([site.boxes, obstacles]),
-        (*site.names, *(o.name for o in state.obstacles)),
-        site.volumes,
-        site.idle,
+    bodies = replace(
+        site,
+        boxes=concatenated([site.boxes, obstacles]),
+        names=(*site.names, *(o.name for o in state.obstacles)),
     )
     return Scene(machines, poses, placed, origin, bodies)
 

@@ -45,6 +45,10 @@ def snapshot_document(snapshot: Snapshot, config: Config) -> dict[str, Any]:
             {"key": notice.key, "line": notice.line, "since": notice.since}
             for notice in snapshot.notices
         ],
+        "gauge": {
+            "choice": snapshot.gauge.choice.digest,
+            "own_tracks": {name: list(on) for name, on in snapshot.gauge.own_tracks.items()},
+        },
         "images": {
             key: {
                 "state_time": stamp.state_time,

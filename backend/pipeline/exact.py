@@ -119,7 +119,10 @@ def own_image(
     the present one when None. Raises ValueError when `own` is not placed.
     """
     machine, state = config.machines[own], snapshot.machines[own]
-    q, layers = state.pose.joints, surroundings_of(own, snapshot.machines, config).layers
+    q, layers = (
+        state.pose.joints,
+        surroundings_of(own, snapshot.machines, config, snapshot.gauge).layers,
+    )
     eta = growth(own, snapshot.machines, config)
     slack = joint_slack(state.pose)
     models = cell_models(machine, q, eta, slack)

@@ -11,7 +11,15 @@ from backend.fusion.inflation import joint_slack
 from backend.machine.model import Machine
 from backend.machine.stopping import full_stopping_distances, stopping_distances
 from backend.pipeline.config import Config
-from backend.pipeline.records import Freedom, MachineMargins, MachineState, Motion, PairDistance
+from backend.pipeline.records import (
+    AS_THE_SITE_SAYS,
+    Freedom,
+    GaugeInForce,
+    MachineMargins,
+    MachineState,
+    Motion,
+    PairDistance,
+)
 from backend.pipeline.surroundings import Surroundings, growth, surroundings_of, why_unknown
 from backend.spatial.types import Array
 
@@ -23,13 +31,15 @@ def machine_margins(
     machines: Mapping[str, MachineState],
     pairs: Iterable[PairDistance],
     config: Config,
+    gauge: GaugeInForce = AS_THE_SITE_SAYS,
 ) -> MachineMargins:
     """Every joint both ways, and all joints together as they move now."""
     reason = why_unknown(own, machines, pairs)
     if reason:
         return MachineMargins(own, float("nan"), reason, (), None)
     machine, pose = config.machines[own], machines[own].pose
-    around, eta = surroundings_of(own, machines, config), growth(own, machines, config)
+    around = surroundings_of(own, machines, config, gauge)
+    eta = growth(own, machines, config)
     n = len(machine.joints)
     directions = np.repeat(np.eye(n), 2, axis=0) * np.tile([-1.0, 1.0], n)[:, None]
     rates = pose.joint_velocities

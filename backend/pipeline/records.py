@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from backend.fusion.pose import FusedPose
 from backend.fusion.samples import Sample
 from backend.safety.alarms import Alarm
 from backend.safety.record import Concern
+from backend.site.gauge_choice import NO_CHOICE, GaugeChoice
 from backend.spatial.boxes import Boxes
 from backend.spatial.types import Array
 
@@ -48,6 +50,7 @@ class Inputs:
     lost: int = 0  # messages dropped because the queue was full
     notices: tuple[Notice, ...] = ()  # those that hold now
     driven: tuple[str, ...] = ()  # machines that somebody here controls: their brakes are judged
+    gauge: GaugeChoice | None = None  # what operators chose of it; None: as before
 
 
 @dataclass(frozen=True)
@@ -141,6 +144,19 @@ class MachineMargins:
 
 
 @dataclass(frozen=True)
+class GaugeInForce:
+    """What holds of the working gauge. choice: of operators; own_tracks: by own machine the tracks
+    that it stands on, which do not hold for it; machines on none are missing.
+    """
+
+    choice: GaugeChoice = NO_CHOICE
+    own_tracks: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+
+
+AS_THE_SITE_SAYS = GaugeInForce()
+
+
+@dataclass(frozen=True)
 class Health:
     """Counters since start."""
 
@@ -165,3 +181,4 @@ class Snapshot:
     health: Health
     margins: dict[str, MachineMargins] = field(default_factory=dict)  # by own machine
     notices: tuple[Notice, ...] = ()
+    gauge: GaugeInForce = AS_THE_SITE_SAYS

@@ -14,6 +14,7 @@ from backend.pipeline.config import Config
 from backend.pipeline.records import MachineMargins, Snapshot
 from backend.pipeline.static_layers import self_not_free, site_not_free
 from backend.pipeline.surroundings import PARTNER, growth, surroundings_of
+from backend.pipeline.working_gauge import site_of
 from backend.spatial.angles import wrap
 from backend.spatial.types import AnyArray, Array
 
@@ -54,7 +55,8 @@ def regions_image(
     partners = surroundings_of(own, snapshot.machines, config).layers[PARTNER]
     grid = joint_grid(machine, shape)
     taken = blocked(arm_model(machine, pose.joints, eta), grid, partners, OUTER)
-    taken |= site_not_free(machine, pose, config.site, eta, shape)
+    around = site_of(own, snapshot.gauge, config)
+    taken |= site_not_free(machine, pose, around, eta, shape)
     taken |= self_not_free(machine, pose.joints, slack, shape)
     free = ~unpacked(taken, shape[3])
     found = regions(free, (0, 0, 0, 0), machine.joints[0].continuous)

@@ -31,15 +31,20 @@ NEAR = 1.0
 
 
 def site_concern(
-    own: str, state: MachineState, now: float, config: Config, driven: bool
+    own: str,
+    state: MachineState,
+    now: float,
+    config: Config,
+    driven: bool,
+    around: SiteBodies,
 ) -> Concern:
-    """The verdict on one own machine; the site has at least one body."""
+    """The verdict on one own machine. around: the bodies that hold for it, at least one."""
     machine = config.machines[own]
     joints = len(machine.joints)
     if state.pose.validity is not Validity.VALID or state.body is None:
         reason = state.pose.reasons[0] if state.pose.reasons else "is unknown"
         return site.unknown(own, joints, f"{config.labels[own]} {reason}", now)
-    bodies = standing(config.site)
+    bodies = standing(around)
     # The pose may be wrong by what its inflation holds beyond the configured factor.
     doubt = state.eta - config.eta
     found = closest(bodies, state.body.boxes, config.limits.slow_below + doubt)
@@ -54,7 +59,7 @@ def standing(bodies: SiteBodies) -> Scene:
     return _standing(ByIdentity(bodies))
 
 
-@lru_cache(maxsize=4)
+@lru_cache(maxsize=16)
 def _standing(bodies: ByIdentity[SiteBodies]) -> Scene:
     return scene(bodies.value.boxes, bodies.value.full_names)
 

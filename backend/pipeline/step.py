@@ -22,8 +22,19 @@ from backend.pipeline.config import Config
 from backend.pipeline.margins import machine_margins
 from backend.pipeline.place import base_transform, place
 from backend.pipeline.proximity import measure
-from backend.pipeline.records import Body3D, Health, Inputs, MachineState, Notice, Snapshot
+from backend.pipeline.records import (
+    AS_THE_SITE_SAYS,
+    Body3D,
+    GaugeInForce,
+    Health,
+    Inputs,
+    MachineState,
+    Notice,
+    Snapshot,
+)
 from backend.pipeline.site_concern import site_concern
+from backend.pipeline.working_gauge import following as gauge_now
+from backend.pipeline.working_gauge import site_of
 from backend.safety import alarms, partner
 from backend.safety.alarms import Alarm
 from backend.safety.partner import Proximity
@@ -40,6 +51,7 @@ class State:
     alarms: tuple[Alarm, ...] = ()
     health: Health = field(default_factory=lambda: Health({}, {}, 0, {}))
     notices: tuple[Notice, ...] = ()
+    gauge: GaugeInForce = AS_THE_SITE_SAYS
     cycle: int = 0
 
 
@@ -59,9 +71,10 @@ def step(state: State, inputs: Inputs, now: float, config: Config) -> tuple[Stat
         name: _machine_state(fuse(rig, streams[name], now, common), rig, config)
         for name, rig in state.rigs.items()
     }
+    gauge = gauge_now(state.gauge, inputs.gauge, machines, config)
     pairs, close, unknown = measure(machines, config)
     margins = (
-        {name: machine_margins(name, machines, pairs, config) for name in config.own}
+        {name: machine_margins(name, machines, pairs, config, gauge) for name in config.own}
         if config.margins
         else {}
     )
@@ -69,10 +82,11 @@ def step(state: State, inputs: Inputs, now: float, config: Config) -> tuple[Stat
     concerns = tuple(
         _partner(name, machines, close, unknown, now, config, name in driven) for name in config.own
     )
-    if len(config.site.boxes):
-        concerns += tuple(
-            site_concern(name, machines[name], now, config, name in driven) for name in config.own
-        )
+    for name in config.own:
+        around = site_of(name, gauge, config)
+        if len(around.boxes):
+            driven_here = name in driven
+            concerns += (site_concern(name, machines[name], now, config, driven_here, around),)
     concerns += tuple(unknown_ages(driven, machines, now, config))
     raised = alarms.update(state.alarms, concerns, now)
     health = _health(state.health, inputs, strangers)
@@ -89,6 +103,7 @@ def step(state: State, inputs: Inputs, now: float, config: Config) -> tuple[Stat
         alarms=raised,
         health=health,
         notices=notices,
+        gauge=gauge,
     )
     following = replace(
         state,
@@ -97,6 +112,7 @@ def step(state: State, inputs: Inputs, now: float, config: Config) -> tuple[Stat
         alarms=raised,
         health=health,
         notices=notices,
+        gauge=gauge,
         cycle=state.cycle + 1,
     )
     return following, snapshot

@@ -10,7 +10,14 @@ import numpy as np
 from backend.fusion.pose import Validity
 from backend.machine.model import Machine
 from backend.pipeline.config import Config
-from backend.pipeline.records import Body3D, MachineState, PairDistance
+from backend.pipeline.records import (
+    AS_THE_SITE_SAYS,
+    Body3D,
+    GaugeInForce,
+    MachineState,
+    PairDistance,
+)
+from backend.pipeline.working_gauge import site_of
 from backend.site.named_bodies import SiteBodies
 from backend.spatial import transform
 from backend.spatial.boxes import Boxes, concatenated
@@ -45,7 +52,12 @@ def why_unknown(
     return next((pair.reason for pair in pairs if own in (pair.a, pair.b) and pair.reason), "")
 
 
-def surroundings_of(own: str, machines: Mapping[str, MachineState], config: Config) -> Surroundings:
+def surroundings_of(
+    own: str,
+    machines: Mapping[str, MachineState],
+    config: Config,
+    gauge: GaugeInForce = AS_THE_SITE_SAYS,
+) -> Surroundings:
     """All other machines that are placed, and the site, about the placed machine `own`."""
     body = machines[own].body
     if body is None:
@@ -55,7 +67,7 @@ def surroundings_of(own: str, machines: Mapping[str, MachineState], config: Conf
         for name, state in machines.items()
         if name != own and state.body is not None
     }
-    return surroundings(config.machines[own], body, others, config.site)
+    return surroundings(config.machines[own], body, others, site_of(own, gauge, config))
 
 
 def growth(own: str, machines: Mapping[str, MachineState], config: Config) -> float:

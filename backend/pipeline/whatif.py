@@ -45,7 +45,7 @@ def touches(snapshot: Snapshot, config: Config, own: str, q: Array) -> bool | No
     """A quick look at the same: whether anything touches; None when that is not known."""
     if why_unknown(own, snapshot.machines, snapshot.pairs):
         return None
-    around = surroundings_of(own, snapshot.machines, config)
+    around = surroundings_of(own, snapshot.machines, config, snapshot.gauge)
     against, itself = touching(config.machines[own], np.asarray(q, float)[None], around.boxes)
     return bool(against[0] or itself[0])
 
@@ -56,7 +56,7 @@ def what_if(snapshot: Snapshot, config: Config, own: str, q: Array) -> WhatIf:
     if reason:
         return WhatIf(own, snapshot.state_time, "UNKNOWN", reason, float("nan"), None, ())
     machine = config.machines[own]
-    around = surroundings_of(own, snapshot.machines, config)
+    around = surroundings_of(own, snapshot.machines, config, snapshot.gauge)
     bodies = body_boxes(machine, link_poses(machine, np.asarray(q, dtype=float)))
     against = verdict(bodies, around.boxes)
     itself = verdict(bodies, bodies, np.array(machine.self_pairs, np.int64).reshape(-1, 2))

@@ -7,6 +7,7 @@ comes back to the pipeline as a stamped input.
 from __future__ import annotations
 
 import logging
+import math
 import threading
 import time
 from collections import deque
@@ -20,6 +21,10 @@ from backend.pipeline.step import initial, step
 from backend.shell.hub import Hub
 from backend.shell.image_loops import ImageLoop, ImageLoops, Stopwatch, ticks
 from backend.shell.kinds import Wishes
+from backend.site.gauge_choice import NO_CHOICE, GaugeChoice
+
+TELL_AGAIN = 1.0
+"""How often what is chosen of the gauge is put in again [s]."""
 
 log = logging.getLogger(__name__)
 
@@ -36,7 +41,8 @@ class Runner:
     loops: what images are made, and how often; wishes: what operators chose, asked each time;
     notices: what operators should know about the cockpit itself, asked each cycle; after_cycle:
     told a cycle's inputs and conclusions once every view has them; driven: which machines somebody
-    controls from here. All must be quick.
+    controls from here; gauge: what operators chose of it, the same object until it changes. All
+    must be quick.
     """
 
     def __init__(
@@ -51,6 +57,7 @@ class Runner:
         notices: Callable[[], tuple[Notice, ...]] = lambda: (),
         after_cycle: Callable[[Inputs, Snapshot], None] = lambda inputs, snapshot: None,
         driven: Callable[[], tuple[str, ...]] = lambda: (),
+        gauge: Callable[[], GaugeChoice] = lambda: NO_CHOICE,
     ) -> None:
         self.config = config
         self.hub = hub
@@ -61,6 +68,8 @@ class Runner:
         self._notices = notices
         self._after_cycle = after_cycle
         self._driven = driven
+        self._gauge = gauge
+        self._told: tuple[GaugeChoice, float] = (NO_CHOICE, -math.inf)
         self._done: deque[ImageStamp] = deque(maxlen=100)
         self._images = ImageLoops(hub, loops, wishes, self._done.append, clock)
         self.image_timing = self._images.timing
@@ -91,16 +100,28 @@ class Runner:
             self._fatal = f"fast loop stopped: {error!r}"
             log.exception("%s", self._fatal)
 
+    def _chosen(self, now: float) -> GaugeChoice | None:
+        """What holds of the gauge when it changed, and now and then, so that whoever plays a part
+        of a recording knows it, too.
+        """
+        chosen, (told, when) = self._gauge(), self._told
+        if chosen is told and (chosen == NO_CHOICE or now - when < TELL_AGAIN):
+            return None
+        self._told = (chosen, now)
+        return chosen
+
     def _fast(self) -> None:
         state = initial(self.config)
         for _ in ticks(self._step_period, self._clock, self._stopping):
             start = self._clock()
             inputs = self._source.take()
             finished = tuple(self._done.popleft() for _ in range(len(self._done)))
-            notices, driven = self._notices(), self._driven()
-            if finished or notices or driven:
+            notices, driven, chosen = self._notices(), self._driven(), self._chosen(start)
+            if finished or notices or driven or chosen is not None:
                 images = inputs.images + finished
-                inputs = replace(inputs, images=images, notices=notices, driven=driven)
+                inputs = replace(
+                    inputs, images=images, notices=notices, driven=driven, gauge=chosen
+                )
             state, snapshot = step(state, inputs, start, self.config)
             self.step_timing.add(start, self._clock())
             self.hub.publish(snapshot)

@@ -42,7 +42,8 @@ def site_bodies(
         if volume.name not in idle:
             boxes.append(volume.boxes)
             names += volume.box_names
-    return SiteBodies(concatenated(boxes), tuple(names), volumes, idle)
+    always = frozenset(site.gauge.on)
+    return SiteBodies(concatenated(boxes), tuple(names), volumes, idle, always)
 
 
 def _gauge(

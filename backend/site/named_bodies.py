@@ -6,7 +6,7 @@ Apart from `bodies`, which makes it: a playback without a gauge loads none of wh
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -24,13 +24,15 @@ class SiteBodies:
     """Boxes that do not move, in the site frame, and their names ("wall", "hall/0", "hall/1").
 
     After the obstacles come the boxes of the working gauge ("gauge:T1/0"), of all volumes but the
-    idle ones. volumes: of the working gauge; idle: by name of a volume, why it holds for nobody.
+    idle ones. volumes: of the working gauge; idle: by name of a volume, why it holds for nobody;
+    always: names of volumes that hold for a machine that stands on them, too.
     """
 
     boxes: Boxes = NO_BOXES
     names: tuple[str, ...] = ()
     volumes: tuple[LimitVolume, ...] = ()
     idle: Mapping[str, str] = field(default_factory=dict)
+    always: frozenset[str] = frozenset()
 
     def __post_init__(self) -> None:
         if len(self.names) != len(self.boxes):
@@ -57,7 +59,7 @@ class SiteBodies:
         if kept.all():
             return self
         names_kept = tuple(name for name in self.names if name not in dropped)
-        return SiteBodies(self.boxes.take(kept), names_kept, self.volumes, self.idle)
+        return replace(self, boxes=self.boxes.take(kept), names=names_kept)
 
     @cached_property
     def standing(self) -> SiteBodies:

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import viser
 
+from backend.site.gauge_choice import GaugeChoice
 from cockpit.views import palette
-from cockpit.views.inputs import SceneSite
+from cockpit.views.inputs import SceneSite, drawn_gauge
 from cockpit.views.lettering import width, written
 from cockpit.views.shapes import Float32, box_mesh, feature_edges, polyline
 
@@ -67,7 +68,6 @@ class Ground:
         arrow += np.float32([center[0] + reach[0], center[1] + 0.75 * reach[1], 0.0])
         _lines(scene, "/ground/north", arrow, palette.SECONDARY, 2.2)
         self._obstacles(scene, site)
-        self._gauge(scene, site)
 
     def _obstacles(self, scene: viser.SceneApi, site: SceneSite) -> None:
         if not len(site.obstacles):
@@ -85,12 +85,36 @@ class Ground:
         )
         _lines(scene, "/obstacles/edges", feature_edges(vertices, faces), palette.SITE, 1.4)
 
-    def _gauge(self, scene: viser.SceneApi, site: SceneSite) -> None:
-        """Nothing that can be seen is there: fainter than obstacles."""
-        if not len(site.gauge):
+    @property
+    def height(self) -> float:
+        return float(self._node.position[2])
+
+    @height.setter
+    def height(self, value: float) -> None:
+        self._node.position = (0.0, 0.0, value)
+
+
+class GaugeNodes:
+    """The working gauge. Nothing that can be seen is there: fainter than obstacles."""
+
+    def __init__(self, scene: viser.SceneApi, site: SceneSite) -> None:
+        self._scene, self._site = scene, site
+        self._shown: GaugeChoice | None = None
+        self._node: viser.MeshHandle | None = None
+
+    def update(self, choice: GaugeChoice) -> None:
+        """Made anew when operators drew or switched something."""
+        if choice == self._shown:
             return
-        vertices, faces = box_mesh(site.gauge)
-        scene.add_mesh_simple(
+        self._shown = choice
+        boxes = drawn_gauge(self._site, choice)
+        if self._node is not None:
+            self._node.remove()  # its edges go with it
+            self._node = None
+        if not len(boxes):
+            return
+        vertices, faces = box_mesh(boxes)
+        self._node = self._scene.add_mesh_simple(
             "/gauge",
             vertices,
             faces,
@@ -100,15 +124,7 @@ class Ground:
             cast_shadow=False,
             receive_shadow=False,
         )
-        _lines(scene, "/gauge/edges", feature_edges(vertices, faces), palette.SITE, 1.0)
-
-    @property
-    def height(self) -> float:
-        return float(self._node.position[2])
-
-    @height.setter
-    def height(self, value: float) -> None:
-        self._node.position = (0.0, 0.0, value)
+        _lines(self._scene, "/gauge/edges", feature_edges(vertices, faces), palette.SITE, 1.0)
 
 
 def ground_height(heights: list[float], before: float) -> float:

@@ -12,9 +12,11 @@ from shapely.geometry.base import BaseGeometry
 from backend.machine.model import Machine
 from backend.pipeline.records import Snapshot
 from backend.site.bodies import site_bodies
-from backend.site.named_bodies import SiteBodies
+from backend.site.gauge_choice import GaugeChoice
+from backend.site.gauge_in_force import in_force
+from backend.site.named_bodies import NO_SITE_BODIES, SiteBodies
 from backend.site.site import Site
-from backend.spatial.boxes import NO_BOXES, Boxes, concatenated
+from backend.spatial.boxes import Boxes, concatenated
 from backend.spatial.types import Array
 from cockpit.views.shapes import LinkLooks, link_looks
 
@@ -47,7 +49,8 @@ class SceneSite:
     """A site as it is drawn.
 
     origin: easting, northing, height of the site frame's origin in the projected CRS [m];
-    machines: in the order of the site; obstacles, gauge: in the site frame;
+    machines: in the order of the site; obstacles: in the site frame; bodies: all that the site file
+    has, from which and what operators choose the drawn gauge is made;
     slow_below, stop_below: limits of the distance [m].
     """
 
@@ -57,7 +60,7 @@ class SceneSite:
     obstacles: Boxes
     slow_below: float
     stop_below: float
-    gauge: Boxes = NO_BOXES
+    bodies: SiteBodies = NO_SITE_BODIES
 
     def __post_init__(self) -> None:
         if not self.machines:
@@ -77,12 +80,15 @@ def scene_site(site: Site, models: Mapping[str, Machine]) -> SceneSite:
         obstacles=bodies.standing.boxes,
         slow_below=site.safety.slow_below,
         stop_below=site.safety.stop_below,
-        gauge=_drawn_gauge(bodies),
+        bodies=bodies,
     )
 
 
-def _drawn_gauge(bodies: SiteBodies) -> Boxes:
-    """Without what lies all around: ceilings and the outside of keep-in areas."""
+def drawn_gauge(site: SceneSite, choice: GaugeChoice) -> Boxes:
+    """The working gauge in force, but for what lies all around: ceilings and the outside of keep-in
+    areas.
+    """
+    bodies = in_force(site.bodies, choice)
     shown = [v for v in bodies.volumes if v.kind not in ("ceiling", "keep_in")]
     return concatenated(v.boxes for v in shown if v.name not in bodies.idle)
 

@@ -7,7 +7,7 @@ import viser
 from backend.pipeline.records import Snapshot
 from cockpit.views import palette
 from cockpit.views.cameras import extent
-from cockpit.views.ground import Ground, ground_height, light
+from cockpit.views.ground import GaugeNodes, Ground, ground_height, light
 from cockpit.views.inputs import SceneSite
 from cockpit.views.machines import MachineNodes
 from cockpit.views.nearest import PairNodes
@@ -26,6 +26,7 @@ class Scene:
             for k, (name, entry) in enumerate(site.machines.items())
         }
         self._pairs = PairNodes(scene, site)
+        self._gauge = GaugeNodes(scene, site)
 
     @property
     def ground(self) -> float:
@@ -35,6 +36,7 @@ class Scene:
     def update(self, snapshot: Snapshot, now: float, lost: float = 0.0) -> None:
         """now: a monotonic clock [s]; lost: seconds without a snapshot, 0 while they come."""
         self._place_ground(snapshot)
+        self._gauge.update(snapshot.gauge.choice)
         for name, nodes in self._machines.items():
             if name in snapshot.machines:
                 nodes.update(snapshot.machines[name], self.ground, now, lost)

@@ -23,7 +23,7 @@ async function request(path, options) {
   return reply;
 }
 
-const posting = (body) => ({ method: "POST", ...(body === undefined ? {} : { headers: { "Content-Type": "application/json" }, body: JSON.stringify(body) }) });
+const posting = (body, method = "POST") => ({ method, ...(body === undefined ? {} : { headers: { "Content-Type": "application/json" }, body: JSON.stringify(body) }) });
 
 async function json(reply) {
   try {
@@ -39,6 +39,9 @@ export async function post(path, body) {
   const reply = await request(path, posting(body));
   return reply.status === 204 ? null : json(reply);
 }
+
+/** Any other method than POST: "PUT", "DELETE". */
+export const send = async (method, path, body) => json(await request(path, posting(body, method)));
 
 /** Posts, and saves the answer as a file; `progress(bytes)` meanwhile. Returns the file's name. */
 export async function download(path, fallback, progress) {

@@ -35,6 +35,7 @@ import * as watermark from "./watermark.js";
 import { startSeries } from "./series_pointer.js";
 import { sessionKey } from "./keys.js";
 import * as drive from "./drive/start.js";
+import * as gauge from "./gauge/panel.js";
 
 readSizes();
 
@@ -84,6 +85,7 @@ function switchImages() {
 function onKey(event) {
   if (event.ctrlKey || event.altKey || event.metaKey || /^(INPUT|SELECT|TEXTAREA)$/.test(event.target?.tagName ?? "")) return;
   if (drive.driveKey(event)) event.stopPropagation();
+  else if (gauge.drawKey(event)) event.stopPropagation();
   else if (event.key >= "1" && event.key <= "9") own(names()[Number(event.key) - 1]);
   else if (event.key === "?") help();
   else if (event.key === "a" || event.key === "A") alarm.silenceAlarms();
@@ -99,6 +101,7 @@ function onKey(event) {
     sheets.close();
     recording.closeRecording();
     drive.closeDialogs();
+    gauge.closeGauge();
     hover.hide();
     ghost.unpin();
     alarm.showList(false);
@@ -144,12 +147,14 @@ transport.startTransport();
 recording.startRecording();
 startSeries(plots.trends);
 along.startAlong(socket.send, () => Object.assign(plots.trends, { dirty: true, last: -Infinity }));
+gauge.startGauge();
 drive.startDriving(socket.send);
 
 function onFrame(header, arrays) {
   const { partner, snapshot: before } = state;
   accept(header, arrays);
   if (header.type === "site") {
+    gauge.forget();
     updateCameras(socket.send);
     socket.send({ type: "own", machine: state.own, page });
     tip.resend();
@@ -199,6 +204,7 @@ function tick() {
   if (old > 0.5 || forced || far() !== null) for (const s of images) s.dirty = true;
   if (link() !== "ok" && state.snapshot) for (const s of live) s.dirty = true;
   headers.update();
+  gauge.update();
   ghost.age();
   hover.refresh();
 }

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import httpx
-from fastapi import FastAPI
+from fastapi import APIRouter, FastAPI
 from websockets.sync.client import ClientConnection, connect
 from websockets.sync.server import ServerConnection, serve
 from websockets.typing import Subprotocol
@@ -159,6 +159,7 @@ def house(
     tls: Tls | None = None,
     sessions: Sessions | None = None,
     hooks: Hooks | None = None,
+    routers: tuple[APIRouter, ...] = (),
     **more: Any,
 ) -> Iterator[House]:
     scene, said = Scene(), []
@@ -184,7 +185,10 @@ def house(
         sources,
         viewer_router(lambda: scene.port, hooks or Hooks()),
         hosts=("127.0.0.1", "localhost"),
-        routers=(session_router(Playback()), camera_router({"x/x": SharedCamera(dark)})),
+        routers=(
+            *(session_router(Playback()), camera_router({"x/x": SharedCamera(dark)})),
+            *routers,
+        ),
         access=access,
     )
     listener = bind("127.0.0.1", 0)

@@ -16,13 +16,14 @@ from backend.machine.load import load_machine
 from backend.shell.sim.program_file import load_program
 from backend.shell.sim.simulate import simulate
 from backend.site.bodies import site_bodies
+from backend.site.gauge_in_force import own_tracks
 from backend.site.site import load_site
 from backend.spatial.boxes import Boxes
 from backend.spatial.rotation import from_attitude
 from backend.spatial.transform import make
 
 SITE = load_site("ballast")
-BODIES = site_bodies(SITE)
+BODIES = site_bodies(SITE).without({"T1"})  # which RAIL stands on
 PERIOD = 50.0
 
 
@@ -43,7 +44,11 @@ def rail() -> list[Boxes]:
 
 
 def test_the_gauge_holds_what_the_thesis_says() -> None:
-    assert set(BODIES.idle) == {"T1", "below"}
+    assert set(BODIES.idle) == {"below"}
+    start = SITE.machine("rail").start
+    assert start is not None
+    at = SITE.frame.from_projected(np.array(start.position))
+    assert own_tracks(site_bodies(SITE), at, start.attitude[0]) == ("T1",)
     kinds = {v.name: v.kind for v in BODIES.volumes}
     assert kinds["T2"] == "track"
     assert kinds["wire-T2"] == "overhead"

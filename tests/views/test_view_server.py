@@ -15,7 +15,11 @@ from viewing import counted, handle, until
 from viser import _messages
 
 from backend.fusion.pose import Validity
+from backend.gauge.volumes import LimitVolume
+from backend.pipeline.records import GaugeInForce
 from backend.safety.record import Level
+from backend.site.gauge_choice import Drawn, GaugeChoice
+from backend.site.named_bodies import SiteBodies
 from backend.spatial.boxes import Boxes
 from cockpit.views import palette
 from cockpit.views.scene import Scene
@@ -141,11 +145,25 @@ def test_obstacles_are_drawn(server: viser.ViserServer) -> None:
 
 def test_the_working_gauge_is_drawn_fainter(server: viser.ViserServer) -> None:
     track = Boxes(np.array([[0, 8, 2.0]]), np.eye(3)[None], np.array([[20, 1.8, 2.0]]))
-    site = dataclasses.replace(toy.site(obstacles=track), gauge=track)
-    Scene(server.scene, site).update(toy.snapshot(), 0.0)
+    bodies = SiteBodies(
+        track, ("gauge:T1/0",), (LimitVolume("T1", "track", boxes=track), LimitVolume("no", "pole"))
+    )
+    site = dataclasses.replace(toy.site(obstacles=track), bodies=bodies)
+    scene, snapshot = Scene(server.scene, site), toy.snapshot()
+    scene.update(snapshot, 0.0)
     corners = track.corners()[0].astype(np.float32)
     np.testing.assert_allclose(handle(server, "/gauge").vertices, corners)
     assert handle(server, "/gauge").opacity < handle(server, "/obstacles").opacity
+    pit = Drawn("pit", "keep_out", ((0.0, 0.0), (4.0, 0.0), (4.0, 3.0), (0.0, 3.0)), -2.0, 1.0)
+    for choice, lowest, farthest in (
+        (GaugeChoice((pit,)), -2.0, 20.0),
+        (GaugeChoice((pit,), (("T1", False),)), -2.0, 4.0),
+    ):
+        gauge = GaugeInForce(choice)
+        scene.update(dataclasses.replace(snapshot, gauge=gauge), 0.0)
+        shown = handle(server, "/gauge").vertices
+        assert shown.min(axis=0)[2] == pytest.approx(lowest)
+        assert shown.max(axis=0)[0] == pytest.approx(farthest)
 
 
 def test_zones_are_drawn_only_when_new_and_greyed_when_old(server: viser.ViserServer) -> None:

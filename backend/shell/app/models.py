@@ -163,6 +163,13 @@ class HealthCountersModel(BaseModel):
     lost: int = Field(description="messages dropped because the queue was full")
 
 
+class GaugeStampModel(BaseModel):
+    choice: str = Field(description="changes with what operators draw and switch")
+    own_tracks: dict[str, list[str]] = Field(
+        description="by own machine the tracks it stands on, which do not hold for it"
+    )
+
+
 class SnapshotModel(BaseModel):
     """One cycle's conclusions."""
 
@@ -177,6 +184,9 @@ class SnapshotModel(BaseModel):
     alarms: list[AlarmModel] = Field(description="the severest first")
     notices: list[NoticeModel] = Field(
         default_factory=list, description="beside the alarms, about the cockpit itself"
+    )
+    gauge: GaugeStampModel | None = Field(
+        None, description="what holds of the working gauge, see /api/gauge"
     )
     images: dict[str, ImageStampModel] = Field(description="newest image by kind and pair")
     health: HealthCountersModel

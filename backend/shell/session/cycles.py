@@ -11,14 +11,16 @@ from typing import Any, TypeAlias
 
 import msgspec
 
+from backend.errors import InputError
 from backend.fusion.samples import ClockSample, Sample
 from backend.pipeline.records import ImageStamp, Inputs, Notice
 from backend.shell.link.codec import DecodeError, decode
 from backend.shell.link.messages import AgentStatus, Command, TrueState
 from backend.shell.link.topics import Direction, match
-from backend.shell.session.format import CLOCK, CYCLE, OWN, Message, seconds
+from backend.shell.session.format import CLOCK, CYCLE, GAUGE, OWN, Message, seconds
 from backend.shell.session.mapping import map_topics
 from backend.shell.session.reader import Session
+from backend.site.gauge_choice import GaugeChoice, checked, from_document
 from backend.site.site import Site
 
 PERIOD = 20_000_000  # of portions where no cycles were recorded [ns]
@@ -147,7 +149,9 @@ def portions(
     on a grid that begins with the session, whatever `start` is.
     """
     reader = _Reader(session, topics)
-    chosen = {*reader.fused, CYCLE, CLOCK} if has_cycles(session) else {*reader.fused, CLOCK}
+    chosen = {*reader.fused, CLOCK}
+    if has_cycles(session):
+        chosen |= {CYCLE, GAUGE}
     messages = session.messages(start, end, chosen)
     if has_cycles(session):
         yield from _recorded(reader, messages)
@@ -202,8 +206,12 @@ class _Reader:
 
 def _recorded(reader: _Reader, messages: Iterator[Message]) -> Iterator[Portion]:
     heard: list[Sample] = []
+    chosen: GaugeChoice | None = None
     newest = -math.inf
     for message in messages:
+        if message.topic == GAUGE:
+            chosen = gauge_choice(message.data) or chosen
+            continue
         if message.topic != CYCLE:
             # What could not be decoded then cannot be now: the cycle's message counts it.
             with suppress(DecodeError):
@@ -213,17 +221,17 @@ def _recorded(reader: _Reader, messages: Iterator[Message]) -> Iterator[Portion]
             cycle = document(message.data)
             own = float(cycle["time"])
             number = int(cycle["cycle"])
-            inputs = _inputs(tuple(heard), cycle)
+            inputs = _inputs(tuple(heard), cycle, chosen)
         except (ValueError, TypeError, KeyError):
             reader.session.note("a cycle's message cannot be read; its portion joins the next")
             continue
         local = reader.local(message.time)
         newest = max(newest, own if abs(own - local) <= SET else local)
-        heard = []
+        heard, chosen = [], None
         yield Portion(newest, message.time, inputs, number)
 
 
-def _inputs(heard: tuple[Sample, ...], cycle: dict[str, Any]) -> Inputs:
+def _inputs(heard: tuple[Sample, ...], cycle: dict[str, Any], chosen: GaugeChoice | None) -> Inputs:
     return Inputs(
         samples=heard,
         images=tuple(ImageStamp(**image) for image in cycle.get("images", ())),
@@ -232,7 +240,16 @@ def _inputs(heard: tuple[Sample, ...], cycle: dict[str, Any]) -> Inputs:
         lost=int(cycle.get("lost", 0)),
         notices=tuple(Notice(**notice) for notice in cycle.get("notices", ())),
         driven=tuple(str(name) for name in cycle.get("driven", ())),
+        gauge=chosen,
     )
+
+
+def gauge_choice(data: bytes) -> GaugeChoice | None:
+    """What operators chose of the working gauge, as a message has it; None for what is none."""
+    try:
+        return checked(from_document(document(data)))
+    except (ValueError, TypeError, KeyError, AttributeError, InputError):
+        return None
 
 
 def _periodic(

@@ -59,10 +59,13 @@ def merged(inputs: Iterable[Inputs]) -> Inputs:
     joined = {
         field.name: sum((getattr(one, field.name) for one in several), start=())
         for field in fields(Inputs)
-        if field.name not in ("lost", "notices", "driven")
+        if field.name not in ("lost", "notices", "driven", "gauge")
     }
-    # Notices, and who is driven, are not events: those of the last cycle hold.
-    return replace(several[-1], **joined, lost=sum(one.lost for one in several))
+    # Notices, and who is driven, are not events: those of the last cycle hold; and of the gauge
+    # what was chosen last.
+    chosen = next((one.gauge for one in reversed(several) if one.gauge is not None), None)
+    lost = sum(one.lost for one in several)
+    return replace(several[-1], **joined, lost=lost, gauge=chosen)
 
 
 def evaluate(

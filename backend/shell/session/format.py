@@ -10,8 +10,10 @@ time t [s] of the monotonic clock becomes `stamp(t)` and comes back bit by bit b
 so that a replay sees exactly what the live pipeline saw.
 
 Order. The messages that a cycle of the pipeline consumed stand before the `/cockpit/cycle`
-message of that cycle. A replay hands them to the pipeline in just these portions; a recording
-without cycles (of a ROS 2 machine) is replayed in portions of one period.
+message of that cycle, what operators chose of the working gauge among them: it is written when it
+changes and once a second, so that whoever plays a part of a recording knows it within a second. A
+replay hands them to the pipeline in just these portions; a recording without cycles (of a ROS 2
+machine) is replayed in portions of one period.
 """
 
 from __future__ import annotations
@@ -30,6 +32,7 @@ METADATA = "cockpit"  # name of the metadata record, the first after the file's 
 OWN = "/cockpit/"
 CYCLE, CLOCK, SNAPSHOT = "/cockpit/cycle", "/cockpit/clock", "/cockpit/snapshot"
 ALARM, ACTION, MARKER = "/cockpit/alarm", "/cockpit/action", "/cockpit/marker"
+GAUGE = "/cockpit/gauge"
 
 _NUMBER, _TEXT, _COUNT = {"type": "number"}, {"type": "string"}, {"type": "integer", "minimum": 0}
 _COUNTS = {
@@ -68,6 +71,8 @@ SCHEMAS: dict[str, dict[str, Any]] = {
         {"machine": _TEXT, "sent": _NUMBER, "remote": _NUMBER, "received": _NUMBER},
         {},
     ),
+    # what operators chose of the working gauge, when it changed and once a second, site frame [m]
+    GAUGE: _object("GaugeChoice", {"drawn": {"type": "array"}, "switched": {"type": "object"}}, {}),
     SNAPSHOT: _object("Snapshot", {"time": _NUMBER, "cycle": _COUNT, "machines": {}}, {}),
     ALARM: _object("Alarms", {"alarms": {"type": "array"}}, {}),
     # what an operator did on a page

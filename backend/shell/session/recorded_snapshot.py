@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -19,6 +21,7 @@ from backend.pipeline.config import Config
 from backend.pipeline.place import base_transform, place
 from backend.pipeline.records import (
     Freedom,
+    GaugeInForce,
     Health,
     ImageStamp,
     MachineMargins,
@@ -30,22 +33,29 @@ from backend.pipeline.records import (
 )
 from backend.safety.alarms import Alarm
 from backend.safety.record import Concern, Evidence, Level
+from backend.site.gauge_choice import NO_CHOICE, GaugeChoice
 from backend.spatial.types import Array
 
 Document = Mapping[str, Any]
+NO_CHOICES: Mapping[str, GaugeChoice] = MappingProxyType({})
 
 
 class NotASnapshot(ValueError):  # noqa: N818 - told to the reader, who skips it
     """A document that is no snapshot of the machines of this site."""
 
 
-def recorded_snapshot(document: Document, config: Config) -> Snapshot:
+def recorded_snapshot(
+    document: Document, config: Config, choices: Mapping[str, GaugeChoice] = NO_CHOICES
+) -> Snapshot:
     """The snapshot of a document. Machines that the site does not list are left out.
+
+    choices: of operators about the working gauge that are known, by digest; of another choice
+    nothing is known.
 
     Raises NotASnapshot for what is missing or of the wrong kind.
     """
     try:
-        return _snapshot(document, config)
+        return replace(_snapshot(document, config), gauge=_gauge(document, choices))
     except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
         raise NotASnapshot(f"a recorded snapshot cannot be read ({error!r})") from error
 
@@ -92,6 +102,15 @@ def _snapshot(document: Document, config: Config) -> Snapshot:
             if name in known
         },
         notices=tuple(Notice(**notice) for notice in document.get("notices", ())),
+    )
+
+
+def _gauge(document: Document, choices: Mapping[str, GaugeChoice]) -> GaugeInForce:
+    told = document.get("gauge", {})
+    own_tracks = told.get("own_tracks", {})
+    return GaugeInForce(
+        choices.get(str(told.get("choice")), NO_CHOICE),
+        {str(name): tuple(str(track) for track in on) for name, on in own_tracks.items()},
     )
 
 

@@ -26,6 +26,7 @@ from backend.shell.session.format import (
     ALARM,
     CLOCK,
     CYCLE,
+    GAUGE,
     MARKER,
     SNAPSHOT,
     dumps,
@@ -33,6 +34,7 @@ from backend.shell.session.format import (
 )
 from backend.shell.session.keeper import Plan, run
 from backend.shell.session.near_miss import NearMiss, NearMisses
+from backend.site.gauge_choice import as_document
 
 ACTIONS = 50  # recorded in a second, at most
 MAX_TEXT = 500  # of a marker
@@ -88,6 +90,9 @@ class Recorder:
                 at = stamp(item.arrival, offset)
                 entries.append(("/" + item.key, item.row.type, at, item.payload))
         self._heard = ()
+        if inputs.gauge is not None:
+            chosen = dumps(as_document(inputs.gauge))
+            entries.append((GAUGE, "", stamp(snapshot.time, offset), chosen))
         entries.append((CYCLE, "", stamp(snapshot.time, offset), _cycle_text(inputs, snapshot)))
         self._feeder.put(entries)
         for miss in self._misses.update(snapshot):

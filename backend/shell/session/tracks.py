@@ -13,10 +13,19 @@ from backend.fusion.streams import SPAN
 from backend.pipeline.config import Config
 from backend.pipeline.records import Inputs, Snapshot
 from backend.safety.alarms import OFF_DELAY, ON_DELAY
-from backend.shell.session.cycles import Portion, Topics, document, has_cycles, portions, samples
-from backend.shell.session.format import CLOCK, SNAPSHOT, Message
+from backend.shell.session.cycles import (
+    Portion,
+    Topics,
+    document,
+    gauge_choice,
+    has_cycles,
+    portions,
+    samples,
+)
+from backend.shell.session.format import CLOCK, GAUGE, SNAPSHOT, Message
 from backend.shell.session.reader import Session
 from backend.shell.session.recorded_snapshot import NotASnapshot, recorded_snapshot
+from backend.site.gauge_choice import GaugeChoice
 
 SECOND = 1_000_000_000
 WARM = round((SPAN + 0.5) * SECOND)  # what the fusion remembers, and the radio's delay [ns]
@@ -25,6 +34,7 @@ SETTLE = round((ON_DELAY + OFF_DELAY + 0.05) * SECOND)  # what alarms remember [
 SETTLE_EVERY = 16  # portions to a step then, before the one that is shown
 EXACT = 3  # cycles in a row, so that the common time no longer hangs on the ones left out
 LOOK_BACK = 30 * SECOND  # for the newest recorded snapshot
+TOLD = 3 * SECOND // 2  # within this, what is chosen of the gauge was recorded again
 
 
 @dataclass(frozen=True)
@@ -139,42 +149,59 @@ class RecordedTrack:
         self._session, self._config = session, config
         self._messages: Iterator[Message] = iter(())
         self._next: Message | None = None
+        self._choices: dict[str, GaugeChoice] = {}
 
     @property
     def ended(self) -> bool:
         return self._next is None
 
     def seek(self, time: int) -> Shown | None:
+        for message in self._session.messages(time - TOLD, time, [GAUGE]):
+            self._choose(message)
         shown = None
         for back in (SECOND, LOOK_BACK):
             found = list(self._session.messages(time - back, time, [SNAPSHOT]))
             shown = next((one for m in reversed(found) if (one := self._shown(m))), None)
             if shown is not None:
                 break
-        self._messages = self._session.messages(start=time + 1, topics=[SNAPSHOT])
-        self._next = next(self._messages, None)
+        self._messages = self._session.messages(start=time + 1, topics=[SNAPSHOT, GAUGE])
+        self._next = self._following()
         return shown
 
     def advance(self, time: int, merge: bool, deadline: float) -> tuple[Shown | None, int]:
         newest = None
         while self._next is not None and self._next.time <= time:
-            newest, self._next = self._next, next(self._messages, None)
+            newest, self._next = self._next, self._following()
             if clocks.monotonic() > deadline:
                 return self._shown(newest), newest.time
         return (None if newest is None else self._shown(newest)), time
 
     def step(self) -> Shown | None:
         while self._next is not None:
-            message, self._next = self._next, next(self._messages, None)
+            message, self._next = self._next, self._following()
             shown = self._shown(message)
             if shown is not None:
                 return shown
         return None
 
+    def _following(self) -> Message | None:
+        """The next recorded snapshot; what was chosen of the gauge before it is remembered."""
+        for message in self._messages:
+            if message.topic == SNAPSHOT:
+                return message
+            self._choose(message)
+        return None
+
+    def _choose(self, message: Message) -> None:
+        choice = gauge_choice(message.data)
+        if choice is not None:
+            self._choices[choice.digest] = choice
+
     def _shown(self, message: Message) -> Shown | None:
         try:
             found = document(message.data)
-            return Shown(message.time, recorded_snapshot(found, self._config), found)
+            snapshot = recorded_snapshot(found, self._config, self._choices)
+            return Shown(message.time, snapshot, found)
         except (ValueError, NotASnapshot):
             self._session.note("some recorded snapshots cannot be read and are left out")
             return None

@@ -12,6 +12,8 @@ import { surface } from "../surface.js";
 import {
   base, chart, circles, drawZone, exitArrow, gauge, gridLines, gridText, iso, nearestLine, north, obstacles, outlines, wedge, zonePoints,
 } from "./plan_layers.js";
+import { drawing, paint as paintDrawing } from "../gauge/drawing.js";
+import { inForce } from "../gauge/model.js";
 import { distanceText, drawZones, outlineSun, view as zoneView, zoneExit, zoneLegend, zoneLines, zoneNote } from "./plan_zone.js";
 
 const WIDTHS = [20, 30, 50, 100];
@@ -87,6 +89,7 @@ function paint(g, width, height, dpr) {
   for (const name of names()) base(g, name);
   north(g, turn);
   if (exact) zoneNote(g, exact, stale);
+  paintDrawing(g);
   g.restore();
   if (!view.tracksUp) gridText(g, grid, height, t);
   const age = Math.max(snapshotAge(), entry ? imageAge(entry) : 0);
@@ -101,7 +104,7 @@ function paint(g, width, height, dpr) {
   return {
     state: {
       own: state.own, partner: state.partner, playback: replaying(), width: view.width, centre: view.centre, up: view.tracksUp ? "tracks" : "north",
-      base: own.position?.slice(0, 2), zone: zone.length, zones, shown: how, zone_stale: stale, exit, nearest, machines: names().filter((name) => machine(name)?.outlines).length,
+      base: own.position?.slice(0, 2), zone: zone.length, zones, shown: how, zone_stale: stale, exit, nearest, gauge: inForce(), machines: names().filter((name) => machine(name)?.outlines).length,
     },
     age,
     label: `Plan of ${view.width} m: ${nameOf(state.own)} base at ${own.position_projected ? own.position_projected.slice(0, 2).map((v) => v.toFixed(1)).join(", ") : "unknown"}; nearest distance to ${nameOf(state.partner)} ${nearest === null ? "unknown" : metres(nearest)}${exit ? `; base inside the warning zone by ${metres(exit)}` : ""}${exact ? `; ${distanceText(exact)}` : ""}`,
@@ -110,7 +113,7 @@ function paint(g, width, height, dpr) {
 
 function probe(x, y) {
   const own = machine(state.own);
-  if (!box || !own || x < box.left || x > box.right || y < box.top || y > box.bottom) return null;
+  if (!box || !own || drawing() || x < box.left || x > box.right || y < box.top || y > box.bottom) return null;
   const [e, n] = chart.back(x, y);
   const origin = state.site?.frame?.origin ?? [0, 0, 0];
   const lines = [`E ${(e + origin[0]).toFixed(1)} m, N ${(n + origin[1]).toFixed(1)} m`];

@@ -5,6 +5,7 @@ import { grouped, metres, ticks } from "../axis.js";
 import { label, segment } from "../pen.js";
 import { cross } from "../glyphs.js";
 import { edgeDistance, inside } from "../geometry.js";
+import { isOwnTrack, volumes } from "../gauge/model.js";
 import { atLeast, label as nameOf, machine, pair, partnerLevel, silence, state } from "../state.js";
 
 /** Of the present drawing: at([E, N]) -> [x, y] and back(x, y) -> [E, N]; px per metre; box; view. */
@@ -148,8 +149,9 @@ export function obstacles(g) {
 /** The working gauge from above. A ceiling is everywhere and so is not drawn. */
 export function gauge(g) {
   const middle = chart.view.centre;
-  for (const volume of state.site?.gauge ?? []) {
+  for (const volume of volumes()) {
     if (volume.idle || volume.kind === "ceiling") continue;
+    const own = isOwnTrack(volume.name);
     let named = null;
     g.beginPath();
     for (const { exterior, holes } of volume.plan) {
@@ -163,14 +165,15 @@ export function gauge(g) {
       }
     }
     if (!named) continue;
-    g.fillStyle = rgba(C.site, 0.14);
+    // What the own machine stands on does not hold for it.
+    g.fillStyle = rgba(C.site, own ? 0.04 : 0.14);
     g.fill("evenodd");
-    g.setLineDash([6, 3]);
+    g.setLineDash(own ? [1.5, 4] : [6, 3]);
     g.lineWidth = 1.2;
     g.strokeStyle = C.site;
     g.stroke();
     g.setLineDash([]);
-    label(g, volume.name, ...chart.at(named.point), { halo: true });
+    label(g, own ? `${volume.name} (own track)` : volume.name, ...chart.at(named.point), { halo: true });
   }
 }
 
