@@ -17,6 +17,7 @@ from backend.pipeline.along_track import Placement, Question, Stretch, along_tra
 from backend.pipeline.config import Config
 from backend.pipeline.place import base_transform
 from backend.pipeline.records import Snapshot
+from backend.pipeline.working_gauge import site_of
 from backend.spatial.types import Array
 
 if TYPE_CHECKING:
@@ -95,8 +96,9 @@ def along_image(
             cycle = thinned(machine, np.concatenate([postures, state.pose.joints[None]]))
             kept = len(cycle.postures)
             span = max(0.0, place.station - AHEAD), min(way.length, place.station + AHEAD)
+            bodies = site_of(own, snapshot.gauge, config).without((way.name,))
             stretches = along_track(
-                *(machine, cycle, way.frames, place, config.site.without((way.name,)), span),
+                *(machine, cycle, way.frames, place, bodies, span),
                 *(question, way.known(machine.bounding_radius)),
             )
         except InputError as error:

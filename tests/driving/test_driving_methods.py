@@ -13,6 +13,7 @@ from backend.control.patterns import Method
 from backend.fusion.pose import Validity
 from backend.pipeline.config import Config
 from backend.pipeline.place import place
+from backend.pipeline.records import AS_THE_SITE_SAYS
 from backend.planning.records import Thresholds
 from backend.planning.stopping import threshold_warnings
 from backend.safety.limiter import Wish
@@ -50,7 +51,8 @@ def reach(config: Config, gap: float) -> float:
 
 def snapshot(config: Config, gap: float, time: float = 1.0, **partner: Any) -> Any:
     right = state(config, "right", reach(config, gap), **partner)
-    return SimpleNamespace(time=time, machines={"left": state(config, "left", 0.0), "right": right})
+    machines = {"left": state(config, "left", 0.0), "right": right}
+    return SimpleNamespace(time=time, machines=machines, gauge=AS_THE_SITE_SAYS)
 
 
 def out(config: Config) -> Wish:
@@ -93,7 +95,7 @@ def test_the_site_counts_by_its_full_name() -> None:
         eta=made.eta,
     )
     far = state(made, "support", 200.0)
-    now = SimpleNamespace(time=1.0, machines={"rail": rail, "support": far})
+    now = SimpleNamespace(time=1.0, gauge=AS_THE_SITE_SAYS, machines={"rail": rail, "support": far})
     wish = Wish(np.eye(6)[0] * -machine.max_velocity, np.zeros(2))  # to T2, at the right
     shaped, told = Methods(made).shape("rail", Method.CONSTRAINED, wish, now, False)
     assert abs(shaped.joints[0]) < machine.max_velocity[0]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from backend.fusion.pose import Validity
 from backend.machine.model import Machine
 from backend.pipeline.config import Config
 from backend.pipeline.records import MachineState, Snapshot
+from backend.pipeline.working_gauge import site_of
 from backend.planning import live
 from backend.planning.live import Around
 from backend.planning.proximity import Limits
@@ -19,7 +21,9 @@ from backend.planning.records import Method as Way
 from backend.planning.records import Thresholds
 from backend.planning.stopping import threshold_warnings
 from backend.safety.limiter import Wish
+from backend.site.named_bodies import SiteBodies
 from backend.spatial.boxes import concatenated
+from backend.spatial.identity import ByIdentity
 from backend.spatial.types import Array
 
 WAYS: dict[Method, Way] = {
@@ -47,8 +51,6 @@ class Methods:
 
     def __init__(self, config: Config) -> None:
         self._config = config
-        site = config.site
-        self._names = tuple(name.partition("/")[0] for name in site.full_names)
         self._thresholds = thresholds_of(config)
         for own in config.own[:1]:
             live.rehearse(config.machines[own])  # no cycle of the loop waits for it
@@ -87,7 +89,8 @@ class Methods:
             return Around(q, np.zeros((0, 4, 4)), nothing, np.zeros(0), unknown)
         # As `site_concern` and `proximity`: beyond the configured part, each pose's inflation.
         doubt = own.eta - config.eta
-        boxes, names = [config.site.boxes], self._names
+        site = site_of(name, snapshot.gauge, config)
+        boxes, names = [site.boxes], _features(ByIdentity(site))
         doubts = [np.full(len(names), doubt)]
         for partner, state in states.items():
             if partner == name or state.body is None:
@@ -112,6 +115,12 @@ class Methods:
             found = _judged(self._config.machines[name], q, self._thresholds, self._config)
             self._warned[name] = now, found
         return found
+
+
+@lru_cache(maxsize=16)
+def _features(site: ByIdentity[SiteBodies]) -> tuple[str, ...]:
+    """The names of a site's boxes, without their numbers."""
+    return tuple(name.partition("/")[0] for name in site.value.full_names)
 
 
 def thresholds_of(config: Config) -> Thresholds:
