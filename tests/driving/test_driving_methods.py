@@ -13,7 +13,7 @@ from backend.control.patterns import Method
 from backend.fusion.pose import Validity
 from backend.pipeline.config import Config
 from backend.pipeline.place import place
-from backend.pipeline.records import AS_THE_SITE_SAYS
+from backend.pipeline.records import AS_THE_SITE_SAYS, GaugeInForce
 from backend.planning.records import Thresholds
 from backend.planning.stopping import threshold_warnings
 from backend.safety.limiter import Wish
@@ -95,7 +95,8 @@ def test_the_site_counts_by_its_full_name() -> None:
         eta=made.eta,
     )
     far = state(made, "support", 200.0)
-    now = SimpleNamespace(time=1.0, gauge=AS_THE_SITE_SAYS, machines={"rail": rail, "support": far})
+    gauge = GaugeInForce(own_tracks={"rail": ("T1",)})
+    now = SimpleNamespace(time=1.0, gauge=gauge, machines={"rail": rail, "support": far})
     wish = Wish(np.eye(6)[0] * -machine.max_velocity, np.zeros(2))  # to T2, at the right
     shaped, told = Methods(made).shape("rail", Method.CONSTRAINED, wish, now, False)
     assert abs(shaped.joints[0]) < machine.max_velocity[0]
