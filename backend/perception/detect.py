@@ -39,7 +39,7 @@ class Settings:
     fewest: int = 5
     smallest: float = 0.15
     largest: float = 12.0
-    person: float = 0.4
+    person: float = 0.45
 
     def __post_init__(self) -> None:
         if not 0.1 <= self.link <= 2.0:
