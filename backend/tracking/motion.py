@@ -1,7 +1,9 @@
 """The three motion models: constant velocity, constant turn, and stopping or random motion.
 
 CV and CT as in Rasul 2021, Eqs. (2)-(5), in the Cartesian form in which they are consistent: the
-velocity itself turns by the turn rate, the box's yaw along with it. The third model, asked for in
+velocity itself turns by the turn rate, the box's yaw along with it. Beyond the paper the turn rate
+fades, as people turn by some angle and go on: a second ahead, a circle would lead astray. The third
+model, asked for in
 that paper's outlook, lets the velocity fade and change at random (Ornstein-Uhlenbeck), as people
 do who stop, start and turn on the spot.
 """
@@ -37,16 +39,18 @@ _STRAIGHT = 1e-6  # turned angle below which the series is used [rad]
 class Noise:
     """Spectral densities of white noise by model (CV, CT, RANDOM): acceleration [m^2/s^3], turn
     rate [rad^2/s^3]; of all: vertical acceleration, yaw [rad^2/s], size [m^2/s]. fade: time in
-    which the third model's velocity falls to 1/e [s]; stay: mean time in one model [s].
+    which the third model's velocity falls to 1/e [s]; turned: the same of the second model's turn
+    rate, as nobody walks in circles; stay: mean time in one model [s].
     """
 
-    acceleration: tuple[float, float, float] = (0.05, 0.1, 3.0)
-    turn: tuple[float, float, float] = (0.1, 1.0, 0.1)
+    acceleration: tuple[float, float, float] = (0.5, 0.3, 2.0)
+    turn: tuple[float, float, float] = (0.1, 4.0, 0.1)
     vertical: float = 0.05
     yaw: float = 0.5
     size: float = 0.01
-    fade: float = 1.0
-    stay: float = 1.0
+    fade: float = 4.0
+    turned: float = 0.4
+    stay: float = 2.0
 
 
 def moved(model: int, x: Array, dt: float, noise: Noise) -> Array:
@@ -66,7 +70,9 @@ def moved(model: int, x: Array, dt: float, noise: Noise) -> Array:
         out[..., PX] += dt * x[..., VX]
         out[..., PY] += dt * x[..., VY]
         return out
-    angle = dt * x[..., TURN]
+    # The turn rate fades; its mean over dt turns the velocity.
+    left = np.exp(-dt / noise.turned)
+    angle = noise.turned * (1.0 - left) * x[..., TURN]
     small = np.abs(angle) < _STRAIGHT
     safe = np.where(small, 1.0, angle)
     ahead = dt * np.where(small, 1.0 - angle**2 / 6.0, np.sin(safe) / safe)
@@ -78,6 +84,7 @@ def moved(model: int, x: Array, dt: float, noise: Noise) -> Array:
     out[..., VX] = cosine * vx - sine * vy
     out[..., VY] = sine * vx + cosine * vy
     out[..., YAW] += angle
+    out[..., TURN] *= left
     return out
 
 

@@ -12,6 +12,7 @@ from backend.tracking.motion import CT, CV, MODELS, RANDOM, Noise, jolts, moved,
 from backend.tracking.records import PX, PY, STATE, TURN, VX, VY, YAW
 
 NOISE = Noise()
+CIRCLE = Noise(turned=1e9)  # a turn rate that does not fade
 
 
 def state(**given: float) -> np.ndarray:
@@ -32,7 +33,7 @@ def modes(rng: np.random.Generator, n: int = 3) -> Modes:
 
 @given(st.floats(-3.0, 3.0), st.floats(0.01, 2.0), st.floats(-2.0, 2.0), st.floats(-2.0, 2.0))
 def test_constant_turn_is_a_circle(turn: float, dt: float, vx: float, vy: float) -> None:
-    end = moved(CT, state(vx=vx, vy=vy, turn=turn), dt, NOISE)
+    end = moved(CT, state(vx=vx, vy=vy, turn=turn), dt, CIRCLE)
     fine, steps = np.zeros(2), 4000
     for k in range(steps):
         angle = turn * dt * (k + 0.5) / steps
@@ -49,6 +50,13 @@ def test_a_turn_that_ends_straight_is_smooth() -> None:
         np.testing.assert_allclose(
             moved(CT, state(vx=1.0, vy=0.5, turn=turn), 0.4, NOISE), straight, atol=1e-5
         )
+
+
+def test_a_turn_fades() -> None:
+    end = moved(CT, state(vx=1.0, turn=1.5), 20.0 * NOISE.turned, NOISE)
+    assert end[YAW] == pytest.approx(1.5 * NOISE.turned)
+    assert abs(end[TURN]) < 1e-8
+    assert np.hypot(end[VX], end[VY]) == pytest.approx(1.0)
 
 
 def test_random_motion_fades() -> None:
