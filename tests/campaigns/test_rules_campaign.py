@@ -125,8 +125,14 @@ RULES = (
     Rule(
         "patterns change in neutral only",
         PATTERNS,
-        "if neutral(sticks) else setting",
-        "if True else setting",
+        "return replace(setting, pattern=pattern) if neutral(sticks) else setting",
+        "return replace(setting, pattern=pattern)",
+    ),
+    Rule(
+        "methods change in neutral only",
+        PATTERNS,
+        "return replace(setting, method=method) if neutral(sticks) else setting",
+        "return replace(setting, method=method)",
     ),
     Rule("fine is slower", PATTERNS, "share = FINE if setting.fine else 1.0", "share = 1.0"),
     Rule("dead zones", PATTERNS, "if not abs(value) > DEAD_ZONE:", "if not abs(value) > 0.0:"),
