@@ -12,6 +12,7 @@ from enum import IntEnum
 
 import numpy as np
 
+from backend.spatial.angles import wrap
 from backend.spatial.types import Array, IntArray
 
 
@@ -46,6 +47,11 @@ class Swing:
     fastest: float
     deceleration: float
 
+    @property
+    def known(self) -> bool:
+        """Whether all of it is a number: without, nothing is safe."""
+        return bool(np.isfinite([*vars(self).values()]).all())
+
 
 def time_to_collision(swing: Swing, place: Array, velocity: Array, clearance: Array) -> Array:
     """(k,) [s] until the swung body's middle line comes within `clearance` of the objects; 0 where
@@ -64,8 +70,9 @@ def time_to_collision(swing: Swing, place: Array, velocity: Array, clearance: Ar
         gap = np.mod(side * delta, 2.0 * np.pi) - wide
         w, a = side * (swing.rate - turning), side * swing.acceleration
         best = np.minimum(best, _reached(gap, w, a, _speeding(swing)))
-    overlapping = np.abs(_wrapped(delta)) <= wide
+    overlapping = np.abs(wrap(delta)) <= wide
     known = np.isfinite(place).all(axis=1) & np.isfinite(velocity).all(axis=1)
+    known &= np.isfinite(wide) & swing.known
     return np.where(overlapping | ~known, 0.0, best)
 
 
@@ -80,7 +87,7 @@ def warning_index(
     """
     place = np.asarray(place, dtype=float)
     far = np.maximum(np.linalg.norm(place, axis=1), 1e-9)
-    delta = _wrapped(np.arctan2(place[:, 1], place[:, 0]) - swing.angle)
+    delta = wrap(np.arctan2(place[:, 1], place[:, 0]) - swing.angle)
     c = far * np.abs(delta) - clearance
     braking = far * swing.rate**2 / (2.0 * swing.deceleration)
     sine = (np.asarray(radius) + uncertainty + keep) / far
@@ -88,7 +95,7 @@ def warning_index(
     left = c - safety
     with np.errstate(divide="ignore", invalid="ignore"):
         x = np.where(braking > 0.0, left / braking, np.where(left > 0.0, np.inf, -np.inf))
-    return np.where(np.isnan(x), -np.inf, x)
+    return np.where(np.isnan(x) | (not swing.known), -np.inf, x)
 
 
 def risk(ttc: Array, index: Array, boundaries: Boundaries | None = None) -> IntArray:
@@ -125,7 +132,3 @@ def _reached(gap: Array, w: Array, a: float, speeding: float) -> Array:
         late = np.where(at_full > 0.0, speeding + (gap - done) / at_full, np.inf)
     late = np.where(late >= speeding, late, np.inf)
     return np.where(soon <= speeding, soon, late)
-
-
-def _wrapped(angle: Array) -> Array:
-    return np.asarray((angle + np.pi) % (2.0 * np.pi) - np.pi)

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from backend.spatial.angles import wrap
 from backend.spatial.types import Array
 from backend.tracking.motion import CT, CV, MODELS, RANDOM, Noise, jolts, moved, switching
 from backend.tracking.records import STATE, YAW
@@ -38,10 +39,10 @@ def mixed(modes: Modes, change: Array) -> Modes:
     weight = joint / np.maximum(prior[:, None, :], 1e-300)
     mean = np.einsum("nij,nix->njx", weight, modes.mean)
     first = modes.mean[:, :1, YAW]
-    turned = wrapped(modes.mean[..., YAW] - first)
+    turned = wrap(modes.mean[..., YAW] - first)
     mean[..., YAW] = first + np.einsum("nij,ni->nj", weight, turned)
     off = modes.mean[:, :, None] - mean[:, None]  # (n, i, j, 11)
-    off[..., YAW] = wrapped(off[..., YAW])
+    off[..., YAW] = wrap(off[..., YAW])
     cov = np.einsum("nij,nixy->njxy", weight, modes.cov)
     cov += np.einsum("nij,nijx,nijy->njxy", weight, off, off)
     return Modes(mean, cov, prior)
@@ -79,10 +80,10 @@ def mixture(modes: Modes) -> tuple[Array, Array]:
     """(n, 11), (n, 11, 11) mean and covariance of all models together."""
     mean = np.einsum("nr,nrx->nx", modes.mode, modes.mean)
     first = modes.mean[:, :1, YAW]
-    turned = wrapped(modes.mean[..., YAW] - first)
+    turned = wrap(modes.mean[..., YAW] - first)
     mean[:, YAW] = first[:, 0] + (modes.mode * turned).sum(axis=1)
     off = modes.mean - mean[:, None]
-    off[..., YAW] = wrapped(off[..., YAW])
+    off[..., YAW] = wrap(off[..., YAW])
     cov = np.einsum("nr,nrxy->nxy", modes.mode, modes.cov)
     return mean, cov + np.einsum("nr,nrx,nry->nxy", modes.mode, off, off)
 
@@ -109,8 +110,3 @@ def born(place: Array, measured: tuple[int, ...], noise: Array, speed: float) ->
         np.broadcast_to(cov, (k, MODELS, STATE, STATE)).copy(),
         np.full((k, MODELS), 1.0 / MODELS),
     )
-
-
-def wrapped(angle: Array) -> Array:
-    """Angles in [-pi, pi)."""
-    return np.asarray((angle + np.pi) % (2.0 * np.pi) - np.pi)

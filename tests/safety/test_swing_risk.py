@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -118,3 +120,19 @@ def test_what_is_not_known_is_an_emergency() -> None:
     bad = np.array([[np.nan, 1.0]])
     assert time_to_collision(swing, bad, np.zeros((1, 2)), np.ones(1))[0] == 0.0
     assert warning_index(swing, bad, np.ones(1), np.ones(1), 0.1, 0.1)[0] == -np.inf
+
+
+@pytest.mark.parametrize("field", ["angle", "rate", "acceleration", "fastest", "deceleration"])
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+def test_a_swing_that_is_not_known_is_an_emergency(field: str, bad: float) -> None:
+    swing = replace(Swing(0.0, 0.5, 0.1, 1.0, 1.0), **{field: bad})
+    place, still, one = np.array([[0.0, 9.0]]), np.zeros((1, 2)), np.ones(1)
+    ttc = time_to_collision(swing, place, still, one)
+    index = warning_index(swing, place, one, one, 0.1, 0.1)
+    assert (ttc[0], index[0]) == (0.0, -np.inf)
+    assert risk(ttc, index)[0] == Risk.EMERGENCY
+
+
+def test_a_clearance_that_is_not_known_is_an_emergency() -> None:
+    swing, place = Swing(0.0, 0.5, 0.1, 1.0, 1.0), np.array([[0.0, 9.0]])
+    assert time_to_collision(swing, place, np.zeros((1, 2)), np.array([np.nan]))[0] == 0.0

@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from backend.tracking.imm import Modes, ahead, mixed, mixture, predicted, unscented, wrapped
+from backend.spatial.angles import wrap
+from backend.tracking.imm import Modes, ahead, mixed, mixture, predicted, unscented
 from backend.tracking.motion import CT, CV, MODELS, RANDOM, Noise, jolts, moved, switching
 from backend.tracking.records import PX, PY, STATE, TURN, VX, VY, YAW
 
@@ -133,7 +134,7 @@ def test_yaw_is_mixed_across_half_a_turn() -> None:
     one = modes(np.random.default_rng(5), 1)
     one.mean[0, :, YAW] = [np.pi - 0.1, -np.pi + 0.1, np.pi - 0.1]
     mean, cov = mixture(one)
-    assert abs(wrapped(mean[0, YAW] - np.pi)) < 0.2
+    assert abs(wrap(mean[0, YAW] - np.pi)) < 0.2
     assert cov[0, YAW, YAW] < one.cov[0, :, YAW, YAW].max() + 0.1
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from backend.spatial.angles import wrap
 from backend.spatial.types import Array
 
 STEP = 0.02  # [s] between two places of a path
@@ -53,19 +54,15 @@ def walk(
         radius = float(np.hypot(*place))
         out = place @ [np.cos(heading), np.sin(heading)] > 0.0
         leaving = (radius > high and out) or (radius < low and not out)
-        if t >= until or (leaving and abs(_wrapped(goal - heading)) < 0.1):
+        if t >= until or (leaving and abs(wrap(goal - heading)) < 0.1):
             if rng.random() < stops and not leaving:
                 wanted, until = 0.0, t + 2.0
             else:
                 goal = heading + rng.choice([-1.0, 1.0]) * rng.uniform(*turns)
                 wanted, until = rng.uniform(*speeds), t + rng.uniform(*legs)
-        off = _wrapped(goal - heading)
+        off = float(wrap(goal - heading))
         heading += float(np.clip(off, -turning * STEP, turning * STEP))
         speed += float(np.clip(wanted - speed, -1.5 * STEP, 1.5 * STEP))
         place = place + speed * STEP * np.array([np.cos(heading), np.sin(heading)])
         places.append(place)
     return Walk(np.array(places))
-
-
-def _wrapped(angle: float) -> float:
-    return float((angle + np.pi) % (2.0 * np.pi) - np.pi)
