@@ -15,7 +15,7 @@ import * as ghost from "./ghost.js";
 import * as tip from "./tip.js";
 import * as headers from "./headers.js";
 import { next, shown } from "./view.js";
-import { page, startScene, updateCameras } from "./scene.js";
+import { beginScene, page, startScene, updateCameras } from "./scene.js";
 import { plan } from "./plots/plan.js";
 import { reach } from "./plots/reach.js";
 import { slices } from "./plots/slices.js";
@@ -50,7 +50,7 @@ for (const s of [...live, ...images]) hover.watch(s);
 const heads = Object.fromEntries(["scene", "plan", "reach", "bars", "limits", "trends", "timeline", "slice-0", "slice-1", "slice-2"].map((name) => [name, head($(`${name}-panel`))]));
 
 let waitingToDraw = null; // wall clock of the newest snapshot not drawn yet
-const latency = { arrival: [], drawn: [] }; // from the snapshot's wall clock [ms]
+const latency = { arrival: [], drawn: [], first: null }; // from the snapshot's wall clock [ms]
 const push = (list, value) => {
   list.push(value);
   if (list.length > 500) list.shift();
@@ -218,7 +218,10 @@ function frame(now) {
     if (s.draw(now, slow) && s === plots.plan) drawn = true;
   }
   if (drawn && waitingToDraw !== null) {
-    push(latency.drawn, Date.now() - 1000 * waitingToDraw);
+    const age = Date.now() - 1000 * waitingToDraw;
+    push(latency.drawn, age);
+    latency.first ??= { after: performance.now(), age };
+    beginScene();
     waitingToDraw = null;
     if ((image() || exactImage() || far() !== null || names().length < 2) && document.body.dataset.ready !== "1") document.body.dataset.ready = "1";
   }
@@ -231,7 +234,7 @@ requestAnimationFrame(frame);
 // For tests and for the curious: what the page knows, to read.
 window.cockpit = Object.freeze({
   get state() { return state; },
-  get latency() { return { arrival: quantiles(latency.arrival), drawn: quantiles(latency.drawn) }; },
+  get latency() { return { arrival: quantiles(latency.arrival), drawn: quantiles(latency.drawn), first: latency.first }; },
   get link() { return link(); },
   get ages() { return { snapshot: snapshotAge() }; },
   get rejected() { return socket.rejected(); },

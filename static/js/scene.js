@@ -8,7 +8,10 @@ let built = "";
 /** This window's own scene: its camera must not follow another operator's buttons. */
 export const page = Array.from(crypto.getRandomValues(new Uint8Array(12)), (byte) => byte.toString(16).padStart(2, "0")).join("");
 
-/** `listeners`: by type of event, for the window of the scene. */
+/**
+ * `listeners`: by type of event, for the window of the scene. Its program is large and shares the
+ * page's thread: it comes with beginScene(), or by itself where no picture ever does.
+ */
 export function startScene(listeners) {
   const frame = $("scene");
   frame.addEventListener("load", () => {
@@ -18,7 +21,13 @@ export function startScene(listeners) {
       // another origin: the keys then work outside the scene only
     }
   });
-  frame.src = `/view/${page}/?hideViserLogo&darkMode`;
+  setTimeout(beginScene, 2000);
+}
+
+/** Once the first snapshot is on the page: distances and alarms do not wait for the 3D scene. */
+export function beginScene() {
+  const frame = $("scene");
+  if (!frame.getAttribute("src")) frame.src = `/view/${page}/?hideViserLogo&darkMode`;
 }
 
 export function updateCameras(send) {
