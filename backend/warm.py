@@ -22,6 +22,7 @@ from backend.machine.outline import outlines_of
 from backend.pipeline.along_cycle import Cycle
 from backend.pipeline.along_track import Placement, Question, along_track
 from backend.pipeline.place import place
+from backend.pipeline.watch import Cloud, Watched, watch
 from backend.planning.live import rehearse
 from backend.safety.approach import Motion, approach
 from backend.safety.limiter import Wish, limit, open_latch
@@ -55,6 +56,9 @@ def compile_kernels() -> None:
     wish = Wish(machine.max_velocity, np.ones(2))
     limit("own", machine, q, wish, (concern,), Delay(0.1, 0.2), open_latch(machine), 0.0)
     rehearse(machine)
+    empty = Watched()
+    cloud = Cloud("own", "lidar", 0.0, _GROUND, np.eye(4), near)
+    watch(watch(empty, (cloud,))[0], (cloud,))
     layers = {"partner": near}
     joint4(machine, layers, (3, 3, 3, 3))
     free = certified4(machine, layers, 0.1, (3, 3, 3, 3)).certified_free()
@@ -68,6 +72,11 @@ def compile_kernels() -> None:
     for base in (np.eye(4), tilted):
         driving_zone(machine, q, base, near, 0.1)
         turning_zone(machine, q, base, near, eta=0.1)
+
+
+_GROUND: Array = np.stack(
+    [*np.meshgrid(np.arange(-5.0, 5.0, 0.5), np.arange(-5.0, 5.0, 0.5)), np.zeros((20, 20))], -1
+).reshape(-1, 3)
 
 
 def _straight(s: Array) -> Array:

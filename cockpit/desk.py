@@ -19,6 +19,7 @@ from backend.pipeline.config import Config
 from backend.pipeline.images import SunParameters
 from backend.pipeline.records import Snapshot
 from backend.safety.partner import Limits
+from backend.safety.people import Watch
 from backend.shell.hub import Hub
 from backend.shell.image_loops import ImageLoop
 from backend.shell.image_worker import ImageWorker
@@ -75,6 +76,11 @@ def make_config(site: Site, models: dict[str, Machine], own: tuple[str, ...], mo
     """The pipeline's configuration; `own` empty means every machine."""
     for name in own:
         site.machine(name)
+    if site.people is not None and not any(model.lidars for model in models.values()):
+        raise InputError(
+            f"{site.path}: people are watched for, but no machine has a LiDAR; needed is "
+            "[[lidar]] in the sidecar of at least one."
+        )
     return Config(
         frame=site.frame,
         machines=models,
@@ -84,6 +90,7 @@ def make_config(site: Site, models: dict[str, Machine], own: tuple[str, ...], mo
         eta=site.safety.eta,
         mode=mode,
         site=site_bodies(site),
+        people=None if site.people is None else Watch(**dict(site.people)),
     )
 
 

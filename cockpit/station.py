@@ -15,6 +15,7 @@ from backend.control.person import Person
 from backend.documents.site import site_document
 from backend.documents.snapshot import snapshot_document
 from backend.errors import InputError
+from backend.pipeline.people_records import Seen
 from backend.pipeline.records import Inputs, Notice, Snapshot
 from backend.shell.access.places import state_folder
 from backend.shell.alarm_log import AlarmLog
@@ -39,6 +40,7 @@ from cockpit.cameras import make_cameras, whep_origins
 from cockpit.desk import Desk, along_loops, image_loops, load_models, make_config, may_say
 from cockpit.driving import make_driving
 from cockpit.options import Options
+from cockpit.people import make_people
 from cockpit.recording import make_recorder, recording_sources, site_folder
 from cockpit.resolutions import resolutions
 from cockpit.views.client_head import HEAD
@@ -100,8 +102,14 @@ class Station:
         self._desk = Desk(self.config, self.hub, lambda: self.view, self.recorder.action)
         kept = state_folder() / "gauge" / f"{site.name}.json"
         self.gauge = GaugeDesk(self.config, self.hub, kept, self._event)
-        self.receiver = Receiver(session, prefixes, everything=self.recorder.wants_everything)
+        self.receiver = Receiver(
+            session,
+            prefixes,
+            everything=self.recorder.wants_everything,
+            clouds=site.recording.clouds,
+        )
         self._closing.callback(self.receiver.close)
+        self.people = make_people(self.config, self.receiver)
         self.driving = make_driving(site, self.config, session, self.receiver, self._event)
         self._closing.callback(self.driving.shut)
         self.runner = Runner(
@@ -118,6 +126,7 @@ class Station:
             after_cycle=self._after_cycle,
             driven=self.driving.driven,
             gauge=self.gauge.choice,
+            people=self._seen,
         )
         frames = Frames(self.hub, self.document)
         relay = Relay(session, self.hub, self._texts, frames.images)
@@ -159,6 +168,9 @@ class Station:
         self.driving.start()
         self.runner.start()
         self._closing.callback(self.runner.stop)
+        if self.people is not None:
+            self.people.start()
+            self._closing.callback(self.people.stop)
         relay.start()
         self._closing.callback(relay.stop)
         self.web.start()
@@ -197,6 +209,7 @@ class Station:
         """Live timings of both loops."""
         return {
             "step": vars(self.runner.step_timing.timing()),
+            **({} if self.people is None else {"people": vars(self.people.timing.timing())}),
             **{name: vars(watch.timing()) for name, watch in self.runner.image_timing.items()},
             "failure": self.runner.failure or self._driving_failure,
         }
@@ -213,11 +226,17 @@ class Station:
                 self._driving_failure = f"driving stopped: {error!r}"
                 log.exception("%s", self._driving_failure)
         self._desk.recent.keep(snapshot)
+        if self.people is not None:
+            self.people.keep(snapshot)
         self.alarm_log.after_cycle(snapshot)
         self.recorder.after_cycle(inputs, snapshot)
 
     def _notices(self) -> tuple[Notice, ...]:
-        return self.recorder.notices() + self.alarm_log.notices() + self.gauge.notices()
+        people = () if self.people is None else self.people.notices()
+        return self.recorder.notices() + self.alarm_log.notices() + self.gauge.notices() + people
+
+    def _seen(self) -> Seen | None:
+        return None if self.people is None else self.people.take()
 
     def _event(self, what: str, who: str, details: dict[str, Any]) -> None:
         """What an operator did with a machine, for the recording and the audit log."""

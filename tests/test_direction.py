@@ -41,12 +41,13 @@ ROOMS: dict[str, set[str]] = {
     },
     "backend.pipeline": {
         *("backend.safety", "backend.cspace", "backend.collision", "backend.fusion"),
+        *("backend.perception", "backend.tracking"),
         *("backend.site", "backend.machine", "backend.spatial", "backend.errors"),
     },
     "backend.documents": {
         *("backend.pipeline", "backend.safety", "backend.cspace", "backend.collision"),
         *("backend.gauge", "backend.site", "backend.fusion", "backend.machine"),
-        *("backend.spatial", "backend.errors"),
+        *("backend.perception", "backend.tracking", "backend.spatial", "backend.errors"),
     },
     "backend.shell": {"backend"},
     "backend.warm": {

@@ -24,7 +24,7 @@ from backend.spatial.boxes import Boxes, concatenated
 from backend.spatial.identity import ByIdentity
 from backend.spatial.types import AnyArray, Array
 
-PARTNER, SITE, SELF = 1, 2, 4
+PARTNER, SITE, SELF, PEOPLE = 1, 2, 4, 8
 """Bits of a cell: its centre touches that layer, bodies as built."""
 
 FREE, COLLIDING = 64, 128
@@ -33,7 +33,7 @@ FREE, COLLIDING = 64, 128
 ETA_STEP = 0.005
 """Models are made for multiples of this growth [m]."""
 
-LAYER_BITS = {"partner": PARTNER, "site": SITE, "self": SELF}
+LAYER_BITS = {"partner": PARTNER, "site": SITE, "self": SELF, "people": PEOPLE}
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ def _model(machine: ByIdentity[Machine], rest: tuple[float, ...], steps: int) ->
 def coded(
     models: CellModels, grid: JointGrid, layers: Mapping[str, Boxes], together: Boxes | None = None
 ) -> AnyArray:
-    """uint8 (swing, boom, stick, bucket) of a grid. layers: "partner", "site" in the root frame;
+    """uint8 (swing, boom, stick, bucket) of a grid. layers: "partner", "site", "people" in the root frame;
     together: all of their boxes, when they are at hand.
     """
     cells = np.zeros(grid.shape, dtype=np.uint8)

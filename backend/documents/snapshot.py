@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from backend.documents.people import people_document
 from backend.machine.model import Machine
 from backend.machine.outline import outlines_of
 from backend.machine.sun_map import sun_angles
@@ -49,6 +50,9 @@ def snapshot_document(snapshot: Snapshot, config: Config) -> dict[str, Any]:
             "choice": snapshot.gauge.choice.digest,
             "own_tracks": {name: list(on) for name, on in snapshot.gauge.own_tracks.items()},
         },
+        "people": None
+        if snapshot.people is None
+        else people_document(snapshot.people, snapshot.time),
         "images": {
             key: {
                 "state_time": stamp.state_time,

@@ -84,9 +84,9 @@ def detect(
 ) -> Stages:
     """Objects in one scan, and every stage on the way.
 
-    points: (n, 3) in the site frame, z up [m]; origin: (3,) of the sensor; machines: all machines'
-    bodies where they are now; plane: the ground when it is known. Points that are no numbers are
-    left out.
+    points: (n, 3) in the site frame, z up [m]; origin: (3,) of the sensor, or (n, 3) of each
+    point's own; machines: all machines' bodies where they are now; plane: the ground when it is
+    known. Points that are no numbers are left out.
     """
     settings = settings or Settings()
     points = np.asarray(points, dtype=float)
@@ -94,11 +94,9 @@ def detect(
         raise InputError(f"detection: points have the shape {points.shape}; needed is (n, 3).")
     finite = np.asarray(np.isfinite(points).all(axis=1))
     safe = np.where(finite[:, None], points, 0.0)
+    origin = np.broadcast_to(origin, points.shape)
     near = finite & (np.hypot(*(safe - origin)[:, :2].T) <= settings.reach)
-    grown = machines.inflated(settings.around)
-    machine = near & inside(
-        np.ascontiguousarray(safe), grown.centers, grown.rotations, grown.half_extents
-    )
+    machine = near & within(safe, machines, settings)
     rest = near & ~machine
     if plane is None:
         plane = find_ground(safe[rest], settings.tolerance)
@@ -110,10 +108,19 @@ def detect(
     ground = rest & (height < settings.low)
     left = np.flatnonzero(rest & (height >= settings.low) & (height <= settings.high))
     found = cluster(safe[left], settings.link)
-    objects, kept = _objects(safe[left], height[left], found, origin, settings)
+    objects, kept = _objects(safe[left], height[left], found, origin[left], settings)
     number = np.full(len(points), -1, np.int64)
     number[left] = kept[found] if len(found) else -1
     return Stages(near, machine, ground, number, plane, objects)
+
+
+def within(points: Array, machines: Boxes, settings: Settings) -> BoolArray:
+    """(n,) whether a point (n, 3) is a machine's own. machines: bodies where they were then."""
+    grown = machines.inflated(settings.around)
+    return np.asarray(
+        inside(np.ascontiguousarray(points), grown.centers, grown.rotations, grown.half_extents),
+        dtype=bool,
+    )
 
 
 def _objects(
@@ -129,7 +136,7 @@ def _objects(
         index = order[ends[c] : ends[c + 1]]
         if len(index) < settings.fewest:
             continue
-        box = _box(points[index], height[index], origin, settings)
+        box = _box(points[index], height[index], origin[index].mean(axis=0), settings)
         if box is not None:
             kept[c] = len(boxes)
             boxes.append((*box, len(index)))

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from backend.fusion.crs import SiteFrame
 from backend.machine.model import Machine
 from backend.safety.partner import Limits
+from backend.safety.people import Watch
 from backend.site.named_bodies import NO_SITE_BODIES, SiteBodies
 
 
@@ -16,7 +17,8 @@ class Config:
 
     eta: configured inflation [m]; far: beyond this gap of two machines' workspaces no exact
     distance is computed [m]; site: what stands on the site; stop_latency: from asking a machine to
-    stop to its first braking [s]; margins: whether joints' margins are computed.
+    stop to its first braking [s]; margins: whether joints' margins are computed; people: how they
+    are judged, None on a site without LiDARs.
     """
 
     frame: SiteFrame
@@ -30,3 +32,4 @@ class Config:
     site: SiteBodies = NO_SITE_BODIES
     stop_latency: float = 0.3
     margins: bool = True
+    people: Watch | None = None

@@ -121,7 +121,7 @@ def own_image(
     machine, state = config.machines[own], snapshot.machines[own]
     q, layers = (
         state.pose.joints,
-        surroundings_of(own, snapshot.machines, config, snapshot.gauge).layers,
+        surroundings_of(own, snapshot.machines, config, snapshot.gauge, snapshot.people).layers,
     )
     eta = growth(own, snapshot.machines, config)
     slack = joint_slack(state.pose)

@@ -11,6 +11,7 @@ from backend.fusion.inflation import joint_slack
 from backend.machine.model import Machine
 from backend.machine.stopping import full_stopping_distances, stopping_distances
 from backend.pipeline.config import Config
+from backend.pipeline.people_records import People
 from backend.pipeline.records import (
     AS_THE_SITE_SAYS,
     Freedom,
@@ -32,13 +33,14 @@ def machine_margins(
     pairs: Iterable[PairDistance],
     config: Config,
     gauge: GaugeInForce = AS_THE_SITE_SAYS,
+    people: People | None = None,
 ) -> MachineMargins:
     """Every joint both ways, and all joints together as they move now."""
     reason = why_unknown(own, machines, pairs)
     if reason:
         return MachineMargins(own, float("nan"), reason, (), None)
     machine, pose = config.machines[own], machines[own].pose
-    around = surroundings_of(own, machines, config, gauge)
+    around = surroundings_of(own, machines, config, gauge, people)
     eta = growth(own, machines, config)
     n = len(machine.joints)
     directions = np.repeat(np.eye(n), 2, axis=0) * np.tile([-1.0, 1.0], n)[:, None]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from backend.fusion.pose import FusedPose
@@ -9,6 +11,7 @@ from backend.machine import kinematics
 from backend.machine.model import Machine
 from backend.pipeline.records import Body3D
 from backend.spatial import rotation, transform
+from backend.spatial.angles import interpolate, wrap
 from backend.spatial.types import Array
 
 
@@ -31,3 +34,23 @@ def place(machine: Machine, q: Array, T_site_root: Array) -> Body3D:
         azimuth=float(kinematics.azimuth(machine, q, T_site_root)),
         reach=float(np.hypot(*(end_point - swing_center)[:2])),
     )
+
+
+def between(machine: Machine, before: FusedPose, after: FusedPose, at: float) -> Body3D:
+    """The machine at a time between two of its poses, before.time <= at <= after.time [s]; outside
+    it is where the nearer one has it.
+    """
+    span = after.time - before.time
+    share = min(max((at - before.time) / span, 0.0), 1.0) if span > 0.0 else 0.0
+    turned = np.where(
+        [joint.continuous for joint in machine.joints],
+        wrap(after.joints - before.joints),
+        after.joints - before.joints,
+    )
+    angles = {
+        name: interpolate(getattr(before, name), getattr(after, name), share)
+        for name in ("yaw", "pitch", "roll")
+    }
+    position = before.position + share * (after.position - before.position)
+    pose = replace(before, position=position, **angles)
+    return place(machine, before.joints + share * turned, base_transform(pose))

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 
 from backend.fusion.pose import FusedPose
 from backend.fusion.samples import Sample
+from backend.pipeline.people_records import People, Seen
 from backend.safety.alarms import Alarm
 from backend.safety.record import Concern
 from backend.site.gauge_choice import NO_CHOICE, GaugeChoice
@@ -51,6 +52,7 @@ class Inputs:
     notices: tuple[Notice, ...] = ()  # those that hold now
     driven: tuple[str, ...] = ()  # machines that somebody here controls: their brakes are judged
     gauge: GaugeChoice | None = None  # what operators chose of it; None: as before
+    people: Seen | None = None  # of the newest scan; None: none since
 
 
 @dataclass(frozen=True)
@@ -182,3 +184,4 @@ class Snapshot:
     margins: dict[str, MachineMargins] = field(default_factory=dict)  # by own machine
     notices: tuple[Notice, ...] = ()
     gauge: GaugeInForce = AS_THE_SITE_SAYS
+    people: People | None = None  # None on a site without LiDARs

@@ -49,7 +49,7 @@ def site_concern(
     doubt = state.eta - config.eta
     found = closest(bodies, state.body.boxes, config.limits.slow_below + doubt)
     names = tuple(f"{own}:{name}" for name in machine.body_names), bodies.names
-    rows = _rows(machine, state, bodies, found, doubt)
+    rows = rows_to(machine, state, bodies, found, doubt)
     braking = _approach(machine, state, bodies, now, config) if driven else None
     return site.judge(own, joints, rows, names, config.limits, now, braking)
 
@@ -64,9 +64,17 @@ def _standing(bodies: ByIdentity[SiteBodies]) -> Scene:
     return scene(bodies.value.boxes, bodies.value.full_names)
 
 
-def _rows(
-    machine: Machine, state: MachineState, bodies: Scene, found: Closest, doubt: float
+def rows_to(
+    machine: Machine,
+    state: MachineState,
+    bodies: Scene,
+    found: Closest,
+    doubt: float,
+    velocity: Array | None = None,
 ) -> site.Rows:
+    """What `found` says, as rows to judge. doubt: what the poses may be wrong by [m]; velocity:
+    (k, 3) of the scene's bodies [m/s], None where they stand.
+    """
     assert state.body is not None
     n = len(machine.joints)
     if not len(found):
@@ -79,7 +87,9 @@ def _rows(
         machine, state.body.link_poses, found.link, found.points[:, 0]
     )
     ahead = np.array([np.cos(state.pose.yaw), np.sin(state.pose.yaw), 0.0])
-    velocity = J @ state.pose.joint_velocities + state.pose.base_velocity
+    moving = J @ state.pose.joint_velocities + state.pose.base_velocity
+    if velocity is not None:
+        moving = moving - velocity[found.body]
     signed = found.distance - found.depth
     return site.Rows(
         own=found.link,
@@ -89,7 +99,7 @@ def _rows(
         points=found.points,
         gradient=np.einsum("kx,kxn->kn", direction, J),
         travel=direction @ ahead,
-        closing=-np.einsum("kx,kx->k", direction, velocity),
+        closing=-np.einsum("kx,kx->k", direction, moving),
     )
 
 

@@ -20,6 +20,10 @@ from backend.fusion.streams import Streams, ingest
 from backend.pipeline.braking import approach_of, unknown_ages
 from backend.pipeline.config import Config
 from backend.pipeline.margins import machine_margins
+from backend.pipeline.people import PeopleState, present
+from backend.pipeline.people import following as people_after
+from backend.pipeline.people_concern import people_concern
+from backend.pipeline.people_records import Judged, People
 from backend.pipeline.place import base_transform, place
 from backend.pipeline.proximity import measure
 from backend.pipeline.records import (
@@ -52,6 +56,7 @@ class State:
     health: Health = field(default_factory=lambda: Health({}, {}, 0, {}))
     notices: tuple[Notice, ...] = ()
     gauge: GaugeInForce = AS_THE_SITE_SAYS
+    people: PeopleState = field(default_factory=PeopleState)
     cycle: int = 0
 
 
@@ -72,13 +77,17 @@ def step(state: State, inputs: Inputs, now: float, config: Config) -> tuple[Stat
         for name, rig in state.rigs.items()
     }
     gauge = gauge_now(state.gauge, inputs.gauge, machines, config)
+    driven = frozenset(inputs.driven)
+    memory, people, somebody = state.people, None, ()
+    if config.people is not None:
+        memory = people_after(state.people, inputs.people, machines, now)
+        people, somebody = _people(memory, machines, driven, now, config)
     pairs, close, unknown = measure(machines, config)
     margins = (
-        {name: machine_margins(name, machines, pairs, config, gauge) for name in config.own}
+        {name: machine_margins(name, machines, pairs, config, gauge, people) for name in config.own}
         if config.margins
         else {}
     )
-    driven = frozenset(inputs.driven)
     concerns = tuple(
         _partner(name, machines, close, unknown, now, config, name in driven) for name in config.own
     )
@@ -87,6 +96,7 @@ def step(state: State, inputs: Inputs, now: float, config: Config) -> tuple[Stat
         if len(around.boxes):
             driven_here = name in driven
             concerns += (site_concern(name, machines[name], now, config, driven_here, around),)
+    concerns += somebody
     concerns += tuple(unknown_ages(driven, machines, now, config))
     raised = alarms.update(state.alarms, concerns, now)
     health = _health(state.health, inputs, strangers)
@@ -104,6 +114,7 @@ def step(state: State, inputs: Inputs, now: float, config: Config) -> tuple[Stat
         health=health,
         notices=notices,
         gauge=gauge,
+        people=people,
     )
     following = replace(
         state,
@@ -113,6 +124,7 @@ def step(state: State, inputs: Inputs, now: float, config: Config) -> tuple[Stat
         health=health,
         notices=notices,
         gauge=gauge,
+        people=memory,
         cycle=state.cycle + 1,
     )
     return following, snapshot
@@ -159,6 +171,28 @@ def _partner(
         return partner.unknown(name, joints, unknown[name], now)
     braking = approach_of(name, machines, now, config) if driven else None
     return partner.judge(name, joints, tuple(close[name]), config.limits, now, braking)
+
+
+def _people(
+    memory: PeopleState,
+    machines: dict[str, MachineState],
+    driven: frozenset[str],
+    now: float,
+    config: Config,
+) -> tuple[People, tuple[Concern, ...]]:
+    """Everybody now, and what they mean for each own machine."""
+    assert config.people is not None
+    here = present(memory, config.people, now)
+    concerns: list[Concern] = []
+    judged: dict[str, Judged] = {}
+    for name in config.own:
+        concern, why = people_concern(
+            name, machines[name], here, memory, now, config, name in driven
+        )
+        concerns.append(concern)
+        if why is not None:
+            judged[name] = why
+    return replace(here, judged=judged), tuple(concerns)
 
 
 def _notices(

@@ -10,6 +10,8 @@ import numpy as np
 from backend.fusion.pose import Validity
 from backend.machine.model import Machine
 from backend.pipeline.config import Config
+from backend.pipeline.people import everybody
+from backend.pipeline.people_records import People
 from backend.pipeline.records import (
     AS_THE_SITE_SAYS,
     Body3D,
@@ -20,26 +22,37 @@ from backend.pipeline.records import (
 from backend.pipeline.working_gauge import site_of
 from backend.site.named_bodies import SiteBodies
 from backend.spatial import transform
-from backend.spatial.boxes import Boxes, concatenated
+from backend.spatial.boxes import NO_BOXES, Boxes, concatenated
 from backend.spatial.types import BoolArray
 
-PARTNER, SITE = "partner", "site"
+PARTNER, SITE, PEOPLE = "partner", "site", "people"
 
 
 @dataclass(frozen=True)
 class Surroundings:
-    """boxes: in the machine's root frame; names: "right:stick/0", "site:wall"; partner: (n,) the
-    box is of another machine, else of the site.
+    """boxes: in the machine's root frame; names: "right:stick/0", "site:wall", "person:P7"; partner,
+    people: (n,) the box is of another machine, or somebody's, else of the site.
     """
 
     boxes: Boxes
     names: tuple[str, ...]
     partner: BoolArray
+    people: BoolArray
 
     @property
     def layers(self) -> dict[str, Boxes]:
-        """ "partner" and "site"."""
-        return {PARTNER: self.boxes.take(self.partner), SITE: self.boxes.take(~self.partner)}
+        """ "partner" and "site", and "people" when somebody is near."""
+        found = {
+            PARTNER: self.boxes.take(self.partner),
+            SITE: self.boxes.take(~(self.partner | self.people)),
+        }
+        return {PEOPLE: self.boxes.take(self.people), **found} if self.people.any() else found
+
+    def layer_of(self, index: int) -> str:
+        """The layer of one box."""
+        if self.people[index]:
+            return PEOPLE
+        return PARTNER if self.partner[index] else SITE
 
 
 def why_unknown(
@@ -57,8 +70,11 @@ def surroundings_of(
     machines: Mapping[str, MachineState],
     config: Config,
     gauge: GaugeInForce = AS_THE_SITE_SAYS,
+    people: People | None = None,
 ) -> Surroundings:
-    """All other machines that are placed, and the site, about the placed machine `own`."""
+    """All other machines that are placed, the site, and everybody who limits machines, about the
+    placed machine `own`.
+    """
     body = machines[own].body
     if body is None:
         raise ValueError(f"{own} is not placed yet")
@@ -67,7 +83,8 @@ def surroundings_of(
         for name, state in machines.items()
         if name != own and state.body is not None
     }
-    return surroundings(config.machines[own], body, others, site_of(own, gauge, config))
+    somebody = (NO_BOXES, ()) if people is None else everybody(people)
+    return surroundings(config.machines[own], body, others, site_of(own, gauge, config), somebody)
 
 
 def growth(own: str, machines: Mapping[str, MachineState], config: Config) -> float:
@@ -77,11 +94,15 @@ def growth(own: str, machines: Mapping[str, MachineState], config: Config) -> fl
 
 
 def surroundings(
-    machine: Machine, body: Body3D, others: Mapping[str, tuple[Machine, Body3D]], site: SiteBodies
+    machine: Machine,
+    body: Body3D,
+    others: Mapping[str, tuple[Machine, Body3D]],
+    site: SiteBodies,
+    people: tuple[Boxes, tuple[str, ...]] = (NO_BOXES, ()),
 ) -> Surroundings:
     """Everything within `machine`'s reach in any posture.
 
-    body: where `machine` is; others: all other machines by name.
+    body: where `machine` is; others: all other machines by name; people: boxes and names.
     """
     apart = np.linalg.norm(site.boxes.centers - body.swing_center, axis=1)
     # Few boxes of a large site are near: only those are looked at, and named.
@@ -97,10 +118,16 @@ def surroundings(
         names += [
             f"{name}:{part}" for part, near_ in zip(other.body_names, kept, strict=True) if near_
         ]
+    machines = len(names)
+    kept = within(people[0], body, machine.bounding_radius)
+    boxes.append(people[0].take(kept))
+    names += [name for name, near_ in zip(people[1], kept, strict=True) if near_]
+    number = np.arange(len(names))
     return Surroundings(
         concatenated(boxes).moved(transform.inverse(body.link_poses[0])),
         tuple(names),
-        np.arange(len(names)) >= of_site,
+        (number >= of_site) & (number < machines),
+        number >= machines,
     )
 
 

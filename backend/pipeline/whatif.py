@@ -11,7 +11,7 @@ from backend.cspace.exact_points import touching
 from backend.machine.kinematics import body_boxes, link_poses
 from backend.pipeline.config import Config
 from backend.pipeline.records import Snapshot
-from backend.pipeline.surroundings import PARTNER, SITE, surroundings_of, why_unknown
+from backend.pipeline.surroundings import surroundings_of, why_unknown
 from backend.spatial.types import Array
 
 SELF = "self"
@@ -45,7 +45,7 @@ def touches(snapshot: Snapshot, config: Config, own: str, q: Array) -> bool | No
     """A quick look at the same: whether anything touches; None when that is not known."""
     if why_unknown(own, snapshot.machines, snapshot.pairs):
         return None
-    around = surroundings_of(own, snapshot.machines, config, snapshot.gauge)
+    around = surroundings_of(own, snapshot.machines, config, snapshot.gauge, snapshot.people)
     against, itself = touching(config.machines[own], np.asarray(q, float)[None], around.boxes)
     return bool(against[0] or itself[0])
 
@@ -56,14 +56,13 @@ def what_if(snapshot: Snapshot, config: Config, own: str, q: Array) -> WhatIf:
     if reason:
         return WhatIf(own, snapshot.state_time, "UNKNOWN", reason, float("nan"), None, ())
     machine = config.machines[own]
-    around = surroundings_of(own, snapshot.machines, config, snapshot.gauge)
+    around = surroundings_of(own, snapshot.machines, config, snapshot.gauge, snapshot.people)
     bodies = body_boxes(machine, link_poses(machine, np.asarray(q, dtype=float)))
     against = verdict(bodies, around.boxes)
     itself = verdict(bodies, bodies, np.array(machine.self_pairs, np.int64).reshape(-1, 2))
 
     def other(i: int, j: int) -> Touch:
-        layer = PARTNER if around.partner[j] else SITE
-        return Touch(machine.body_names[i], around.names[j], layer)
+        return Touch(machine.body_names[i], around.names[j], around.layer_of(j))
 
     def own_body(i: int, j: int) -> Touch:
         return Touch(machine.body_names[j], f"{own}:{machine.body_names[i]}", SELF)

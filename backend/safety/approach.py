@@ -92,7 +92,8 @@ def approach(
     boxes = its.placed(other.T_site_links)
     twists = _twists(other_machine, other, its.moves, boxes[0])
     others = tuple(f"{other_name}:{name}" for name in its.names)
-    return _rows(machine, own, boxes, twists, its.group, others, keep, age, delay, SHARE)
+    least = np.zeros(len(its.group))
+    return _rows(machine, own, boxes, twists, least, its.group, others, keep, age, delay, SHARE)
 
 
 def approach_standing(
@@ -107,11 +108,31 @@ def approach_standing(
     """The same towards boxes (k) that do not move. keep: p_l and what the own pose may be wrong by
     [m]. The machine may use all of the room: nothing else comes nearer meanwhile.
     """
+    still = np.zeros((len(boxes), 3))
+    return approach_moving(machine, own, boxes, still, still[:, 0], names, keep, age, delay)
+
+
+def approach_moving(
+    machine: Machine,
+    own: Motion,
+    boxes: Boxes,
+    velocity: Array,
+    least: Array,
+    names: tuple[str, ...],
+    keep: float,
+    age: float,
+    delay: float,
+) -> Approach:
+    """The same towards boxes (k) that move but do not turn, people for one. velocity: (k, 3) [m/s];
+    least: (k,) speed at which each may come nearer whatever it does now [m/s]. The machine may use
+    all of the room that is left by what comes nearer until it stands.
+    """
     k = len(boxes)
     twice = np.concatenate([np.arange(k)] * 2)  # each is its own hull, too
-    still = np.zeros((2 * k, 3)), np.zeros((2 * k, 3))
+    twists = velocity[twice], np.zeros((2 * k, 3))
     held = boxes.centers[twice], boxes.rotations[twice], boxes.half_extents[twice]
-    return _rows(machine, own, held, still, k + twice, names * 2, keep, age, delay, 1.0)
+    group, both = k + twice, names * 2
+    return _rows(machine, own, held, twists, least[twice], group, both, keep, age, delay, 1.0)
 
 
 def standing_reach(machine: Machine, keep: float, delay: float) -> float:
@@ -130,6 +151,7 @@ def _rows(
     own: Motion,
     others: tuple[Array, Array, Array],
     twists: tuple[Array, Array],
+    least: Array,
     group: IntArray,
     names: tuple[str, ...],
     keep: float,
@@ -147,6 +169,7 @@ def _rows(
         mine.placed(own.T_site_links),
         others,
         twists,
+        np.ascontiguousarray(least, dtype=float),
         (mine.group, group),
         mine.moves,
         axes,

@@ -62,6 +62,7 @@ def rows(
     own: tuple[Array, Array, Array],
     other: tuple[Array, Array, Array],
     twists: tuple[Array, Array],
+    least: Array,
     groups: tuple[IntArray, IntArray],
     moves: BoolArray,
     axes: Array,
@@ -77,7 +78,8 @@ def rows(
 
     own, other: centers, rotations, half_extents, of bodies and then of hulls, boxes about all
     bodies of a link; twists: velocities (k, 3) of the other boxes' centres and their angular
-    velocities; groups: the hull of each own and of each other box, a hull's own number for hulls.
+    velocities; least: (k,) speed at which each may come nearer whatever it does now [m/s]; groups:
+    the hull of each own and of each other box, a hull's own number for hulls.
     Hulls that are near each other are looked into, body by body.
     moves: (boxes, n); axes, origins: (n, 3) of the joints; base: ahead (3,), up (3,), origin (3,),
     gauge [m]; reach: (m,) how far each motion goes before it stands, from full speed; keep: the gap
@@ -115,6 +117,7 @@ def rows(
                     _motions(x[which], moves[i], axes, origins, base, J[which], K[which])
                     most[which] = _most(J[which], K[which], reach)
             top, speed = _closing(normal, cb[j], Rb[j], hb[j], twists[0][j], twists[1][j], horizons)
+            speed = max(speed, least[j])
             n0, n1, n2 = normal[0], normal[1], normal[2]
             for which in range(8):
                 # On overlap the plane cuts both boxes: the gap is that of the pair.

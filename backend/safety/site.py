@@ -43,15 +43,17 @@ def judge(
     limits: Limits,
     now: float,
     approach: Approach | None = None,
+    name: str = NAME,
 ) -> Concern:
     """CLEAR, SLOW or STOP from all close pairs (Mäkinen 2021, Eq. (3.11) corrected).
 
     names: of own bodies ("left:boom/0") and of the site's ("site:wall"); approach: what braking is
-    judged by, where somebody drives. Of all pairs the most restrictive wins in each direction.
+    judged by, where somebody drives; name: of the concern. Of all pairs the most restrictive wins
+    in each direction.
     """
     free = np.ones((joints, 2)), np.ones(2)
     if not len(rows.margin):
-        return Concern(NAME, machine, Level.CLEAR, "nothing near", *free, None, now, approach)
+        return Concern(name, machine, Level.CLEAR, "nothing near", *free, None, now, approach)
     fractions = linear(rows.margin, limits.stop_below, limits.slow_below)
     allowed = allowed_speeds(rows.gradient, fractions)
     travel = allowed_speeds(rows.travel[:, None], fractions)[0]
@@ -66,11 +68,11 @@ def judge(
     ttc = max(distance, 0.0) / closing if closing > 1e-3 else float("inf")
     evidence = Evidence(own, other, distance, rows.points[k], ttc)
     reason = f"{part(own)} is {max(distance, 0.0):.2f} m from {part(other)}"
-    return Concern(NAME, machine, level, reason, allowed, travel, evidence, now, approach)
+    return Concern(name, machine, level, reason, allowed, travel, evidence, now, approach)
 
 
-def unknown(machine: str, joints: int, reason: str, now: float) -> Concern:
+def unknown(machine: str, joints: int, reason: str, now: float, name: str = NAME) -> Concern:
     """Nothing may move where a machine stands among obstacles, but not where."""
     none = np.zeros((joints, 2)), np.zeros(2)
     evidence = Evidence(machine, "", float("nan"), None, float("inf"))
-    return Concern(NAME, machine, Level.UNKNOWN, reason, *none, evidence, now)
+    return Concern(name, machine, Level.UNKNOWN, reason, *none, evidence, now)

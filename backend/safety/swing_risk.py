@@ -69,7 +69,7 @@ def time_to_collision(swing: Swing, place: Array, velocity: Array, clearance: Ar
     for side in (1.0, -1.0):
         gap = np.mod(side * delta, 2.0 * np.pi) - wide
         w, a = side * (swing.rate - turning), side * swing.acceleration
-        best = np.minimum(best, _reached(gap, w, a, _speeding(swing)))
+        best = np.minimum(best, reached(gap, w, a, speeding(swing)))
     overlapping = np.abs(wrap(delta)) <= wide
     known = np.isfinite(place).all(axis=1) & np.isfinite(velocity).all(axis=1)
     known &= np.isfinite(wide) & swing.known
@@ -106,7 +106,7 @@ def risk(ttc: Array, index: Array, boundaries: Boundaries | None = None) -> IntA
     return np.where(emergency, Risk.EMERGENCY, np.where(warning, Risk.WARNING, Risk.SAFE))
 
 
-def _speeding(swing: Swing) -> float:
+def speeding(swing: Swing) -> float:
     """t_m: how long the swing can accelerate as it does now [s]."""
     a = swing.acceleration
     if a == 0.0:
@@ -114,7 +114,7 @@ def _speeding(swing: Swing) -> float:
     return float(max((np.sign(a) * swing.fastest - swing.rate) / a, 0.0))
 
 
-def _reached(gap: Array, w: Array, a: float, speeding: float) -> Array:
+def reached(gap: Array, w: Array, a: float, speeding: float) -> Array:
     """(k,) least t >= 0 at which w t + a t^2 / 2, at constant speed from `speeding` on, is gap."""
     if a == 0.0 or speeding == 0.0:
         with np.errstate(divide="ignore", invalid="ignore"):

@@ -16,6 +16,7 @@ from dataclasses import replace
 from typing import Protocol
 
 from backend.pipeline.config import Config
+from backend.pipeline.people_records import Seen
 from backend.pipeline.records import ImageStamp, Inputs, Notice, Snapshot
 from backend.pipeline.step import initial, step
 from backend.shell.hub import Hub
@@ -41,8 +42,8 @@ class Runner:
     loops: what images are made, and how often; wishes: what operators chose, asked each time;
     notices: what operators should know about the cockpit itself, asked each cycle; after_cycle:
     told a cycle's inputs and conclusions once every view has them; driven: which machines somebody
-    controls from here; gauge: what operators chose of it, the same object until it changes. All
-    must be quick.
+    controls from here; gauge: what operators chose of it, the same object until it changes; people:
+    what LiDARs saw since it was last asked. All must be quick.
     """
 
     def __init__(
@@ -58,6 +59,7 @@ class Runner:
         after_cycle: Callable[[Inputs, Snapshot], None] = lambda inputs, snapshot: None,
         driven: Callable[[], tuple[str, ...]] = lambda: (),
         gauge: Callable[[], GaugeChoice] = lambda: NO_CHOICE,
+        people: Callable[[], Seen | None] = lambda: None,
     ) -> None:
         self.config = config
         self.hub = hub
@@ -69,6 +71,7 @@ class Runner:
         self._after_cycle = after_cycle
         self._driven = driven
         self._gauge = gauge
+        self._people = people
         self._told: tuple[GaugeChoice, float] = (NO_CHOICE, -math.inf)
         self._done: deque[ImageStamp] = deque(maxlen=100)
         self._images = ImageLoops(hub, loops, wishes, self._done.append, clock)
@@ -117,10 +120,15 @@ class Runner:
             inputs = self._source.take()
             finished = tuple(self._done.popleft() for _ in range(len(self._done)))
             notices, driven, chosen = self._notices(), self._driven(), self._chosen(start)
-            if finished or notices or driven or chosen is not None:
-                images = inputs.images + finished
+            people = self._people()
+            if finished or notices or driven or chosen is not None or people is not None:
                 inputs = replace(
-                    inputs, images=images, notices=notices, driven=driven, gauge=chosen
+                    inputs,
+                    images=inputs.images + finished,
+                    notices=notices,
+                    driven=driven,
+                    gauge=chosen,
+                    people=people,
                 )
             state, snapshot = step(state, inputs, start, self.config)
             self.step_timing.add(start, self._clock())

@@ -19,6 +19,7 @@ from backend.site.tables import (
     Link,
     Obstacle,
     ObstacleMesh,
+    People,
     Rates,
     Recording,
     Safety,
@@ -51,6 +52,7 @@ class Site:
     recording: Recording
     can_map: Path | None = None
     gauge: Gauge = field(default_factory=Gauge)
+    people: People | None = None
 
     @property
     def folder(self) -> Path:
@@ -128,6 +130,7 @@ def parse_site(data: dict[str, Any], path: Path) -> Site:
         recording=table.recording,
         can_map=path.resolve().parent / can_map if can_map else None,
         gauge=table.gauge,
+        people=table.people,
     )
 
 

@@ -198,16 +198,40 @@ class Link(Table):
     listen: tuple[str, ...] = ()
 
 
+class People(Table):
+    """People are watched for, by the LiDARs of the site's machines. slow_below, stop_below:
+    distances of people to machines at which motion towards them begins to slow and stops [m];
+    walking: speed at which anybody may begin to come nearer [m/s]; stale: without a scan for so
+    long people are unknown, and nothing moves [s].
+    """
+
+    slow_below: Positive = 2.0
+    stop_below: NotNegative = 0.6
+    walking: Annotated[float, Field(ge=0.0, le=10.0)] = 1.0
+    stale: Annotated[float, Field(ge=0.15, le=5.0)] = 0.5
+
+    @model_validator(mode="after")
+    def _ordered(self) -> People:
+        if self.stop_below >= self.slow_below:
+            raise ValueError(
+                f"stop_below is {self.stop_below}; allowed is less than slow_below "
+                f"({self.slow_below})"
+            )
+        return self
+
+
 class Recording(Table):
     """What a running cockpit records. folder: of all recordings, relative to the site file; empty
     for $EXCAVATOR_COCKPIT_RECORDINGS or ~/.local/state/excavator-cockpit/recordings. The oldest
-    parts beyond max_gib [GiB] and max_hours [h] are deleted, except those that are pinned.
+    parts beyond max_gib [GiB] and max_hours [h] are deleted, except those that are pinned. clouds:
+    points of LiDARs, too, about 12 GiB an hour each.
     """
 
     enabled: bool = True
     folder: str = ""
     max_gib: Annotated[float, Field(ge=0.1, le=10_000.0)] = 4.0
     max_hours: Annotated[float, Field(ge=0.1, le=10_000.0)] = 24.0
+    clouds: bool = False
 
 
 class SiteTable(Table):
@@ -227,6 +251,7 @@ class SiteTable(Table):
     recording: Recording = Recording()
     can: Can = Can()
     gauge: Gauge = Gauge()
+    people: People | None = None
 
     @model_validator(mode="after")
     def _distinct(self) -> SiteTable:

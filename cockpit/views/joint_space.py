@@ -24,6 +24,7 @@ OLD = 1.0  # [s] after which an image is no longer coloured
 PERIOD = 0.2  # [s] between changes of the surfaces: each one sends them again
 
 COLORS = {
+    "people": palette.PEOPLE,
     "partner": palette.PARTNER,
     "site": palette.SITE,
     "self": palette.SELF,

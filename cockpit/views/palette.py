@@ -27,6 +27,7 @@ REACH_NOW = rgb("#BCCBD7")
 REACH_MAX = rgb("#94A6B4")
 PARTNER = rgb("#A970F0")
 SITE = rgb("#3E8E78")
+PEOPLE = rgb("#FFFFFF")
 SELF = rgb("#C0B8D9")
 UNDECIDED = rgb("#8A949E")
 BLOCKED = rgb("#FF6B5E")  # a stopping distance that does not end in what is certified free

@@ -10,11 +10,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from backend.cspace.cells import COLLIDING, FREE, PARTNER, SELF, SITE
+from backend.cspace.cells import COLLIDING, FREE, PARTNER, PEOPLE, SELF, SITE
 from backend.spatial.types import AnyArray, Array, BoolArray
 from cockpit.views.shapes import Float32, UInt32
 
-CAUSES: Mapping[str, int] = {"partner": PARTNER, "site": SITE, "self": SELF, "other": 8 | 16 | 32}
+CAUSES: Mapping[str, int] = {
+    "people": PEOPLE,
+    "partner": PARTNER,
+    "site": SITE,
+    "self": SELF,
+    "other": 16 | 32,
+}
 """What a cell hits, and its bits; the first that applies gives the colour."""
 
 UNDECIDED = "undecided"

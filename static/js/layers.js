@@ -6,7 +6,7 @@ import { swatches } from "./pen.js";
 export const FREE = 64; // the whole cell is certified free
 export const COLLIDING = 128; // the whole cell is certified colliding
 export const OUTSIDE = 192; // no cell here; never on the wire
-const PARTNER = 1, SITE = 2, SELF = 4, NEAR_LIMIT = 8, BEYOND_LIMIT = 16, OUT_OF_REACH = 32;
+const PARTNER = 1, SITE = 2, SELF = 4, NEAR_LIMIT = 8, BEYOND_LIMIT = 16, OUT_OF_REACH = 32, PEOPLE_IN_REACH = 64;
 
 /** On top first. `bit` of joint images and bars. */
 export const LAYERS = [
@@ -18,7 +18,7 @@ export const LAYERS = [
   { bit: 32, name: "other", colour: C.text, hatch: "|" },
 ];
 /** The reach image is not certified and has no undecided cells, but limits. */
-const REACH_LAYERS = LAYERS.filter(({ bit }) => bit <= SELF);
+const REACH_LAYERS = LAYERS.filter(({ bit, name }) => bit <= SELF || name === "people").map((layer) => (layer.name === "people" ? { ...layer, bit: PEOPLE_IN_REACH } : layer));
 
 /** Of the reach image: what else a byte tells. */
 export const layerBits = { near: NEAR_LIMIT, beyond: BEYOND_LIMIT, out: OUT_OF_REACH, unreachable: BEYOND_LIMIT | OUT_OF_REACH };
@@ -34,7 +34,7 @@ export const reachKind = {
   name: "reach",
   partner: PARTNER,
   layers: REACH_LAYERS,
-  hits: (b) => b & 7,
+  hits: (b) => b & (7 | PEOPLE_IN_REACH),
   undecided: () => false,
   plain: (b) => (b & OUT_OF_REACH ? "out" : b & BEYOND_LIMIT ? "beyond" : b & NEAR_LIMIT ? "near" : null),
 };

@@ -24,7 +24,7 @@ from backend.spatial.types import AnyArray
 if TYPE_CHECKING:
     from backend.pipeline.along import AlongImage
 
-NEAR_LIMIT, BEYOND_LIMIT, OUT_OF_REACH = 8, 16, 32
+NEAR_LIMIT, BEYOND_LIMIT, OUT_OF_REACH, PEOPLE_IN_REACH = 8, 16, 32, 64
 """Bits of a reach cell beside the layers' own."""
 
 
@@ -103,7 +103,7 @@ def reach_cells(reach: ReachImage) -> AnyArray:
     """(swing, reach) uint8: the layers' bits where it collides, and the bits above."""
     cells = np.zeros(reach.state.shape, dtype=np.uint8)
     for name, hit in reach.layers.items():
-        cells[hit] |= LAYER_BITS[name]
+        cells[hit] |= PEOPLE_IN_REACH if name == "people" else LAYER_BITS[name]
     cells[reach.near_limit] |= NEAR_LIMIT
     cells[reach.state == ReachState.BEYOND_LIMIT] = BEYOND_LIMIT
     cells[reach.state == ReachState.OUT_OF_REACH] = OUT_OF_REACH

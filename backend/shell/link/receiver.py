@@ -26,8 +26,10 @@ QUEUE = 8192  # messages: 8 s of four machines at full rate
 POLL_PERIOD = 0.5  # [s] between two questions for a machine's clock
 POLL_TIMEOUT = 1.0  # [s]
 MAX_LABELS = 100
-NOT_FOR_FUSION = ("points",)  # not decoded here
+POINTS = "points"
+NOT_FOR_FUSION = (POINTS,)  # not decoded here
 BESIDE_BYTES = 64 * 2**20  # of messages that are only recorded
+CLOUDS = 8  # newest of each machine that wait
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +66,7 @@ class Receiver:
 
     machines: key prefix on the wire -> the site's name of the machine. clock: the local clock that
     arrivals and round trips are told by [s]. everything: also what only a recorder wants, such as
-    commands and clouds of points.
+    commands; clouds: it wants clouds of points, too, which are most of all bytes.
     """
 
     def __init__(
@@ -74,6 +76,7 @@ class Receiver:
         clock: Callable[[], float] = time.monotonic,
         poll_period: float = POLL_PERIOD,
         everything: bool = False,
+        clouds: bool = True,
     ) -> None:
         for prefix in machines:
             if not prefix or any(c in prefix for c in "*$?#{} ") or prefix.strip("/") != prefix:
@@ -85,6 +88,8 @@ class Receiver:
         self._clock = clock
         self._queue: deque[Heard | ClockSample] = deque()
         self._everything = everything
+        self._record_clouds = clouds
+        self._clouds: dict[str, deque[Heard]] = {}
         self._beside: deque[Heard] = deque()
         self._beside_bytes = 0
         self._lock = threading.Lock()
@@ -137,6 +142,17 @@ class Receiver:
         counts = tuple(malformed.items()), tuple(foreign.items())
         return Drained(tuple(samples), *counts, lost, tuple(heard))
 
+    def take_clouds(self) -> list[Heard]:
+        """The newest clouds of points since the last call, not decoded. From any one thread."""
+        with self._lock:
+            found = [cloud for waiting in self._clouds.values() for cloud in waiting]
+            self._clouds = {}
+        return found
+
+    def refuse(self, label: str) -> None:
+        """Count a message that turned out to be malformed."""
+        self._count(self._malformed, label)
+
     def statuses(self) -> dict[str, AgentStatus]:
         """The newest status of each machine's agent by the site's names, as of the last `drain`."""
         return dict(self._statuses)
@@ -184,8 +200,16 @@ class Receiver:
         row = found[0]
         if _for_fusion(row):
             self._append(Heard(machine, key_, suffix, row, payload.to_bytes(), arrival))
+        elif row.name == POINTS:
+            self._put_cloud(Heard(machine, key_, suffix, row, payload.to_bytes(), arrival))
         elif self._everything and row.recorded:
             self._put_beside(Heard(machine, key_, suffix, row, payload.to_bytes(), arrival))
+
+    def _put_cloud(self, item: Heard) -> None:
+        with self._lock:
+            self._clouds.setdefault(item.machine, deque(maxlen=CLOUDS)).append(item)
+        if self._everything and self._record_clouds:
+            self._put_beside(item)
 
     def _put_beside(self, item: Heard) -> None:
         """Commands of cockpits, ours among them, and clouds of points: nobody waits for them."""

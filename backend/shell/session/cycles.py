@@ -13,12 +13,14 @@ import msgspec
 
 from backend.errors import InputError
 from backend.fusion.samples import ClockSample, Sample
+from backend.pipeline.people_records import Seen
 from backend.pipeline.records import ImageStamp, Inputs, Notice
 from backend.shell.link.codec import DecodeError, decode
 from backend.shell.link.messages import AgentStatus, Command, TrueState
 from backend.shell.link.topics import Direction, match
-from backend.shell.session.format import CLOCK, CYCLE, GAUGE, OWN, Message, seconds
+from backend.shell.session.format import CLOCK, CYCLE, GAUGE, OWN, PEOPLE, Message, seconds
 from backend.shell.session.mapping import map_topics
+from backend.shell.session.people_message import seen_of
 from backend.shell.session.reader import Session
 from backend.site.gauge_choice import GaugeChoice, checked, from_document
 from backend.site.site import Site
@@ -151,7 +153,7 @@ def portions(
     reader = _Reader(session, topics)
     chosen = {*reader.fused, CLOCK}
     if has_cycles(session):
-        chosen |= {CYCLE, GAUGE}
+        chosen |= {CYCLE, GAUGE, PEOPLE}
     messages = session.messages(start, end, chosen)
     if has_cycles(session):
         yield from _recorded(reader, messages)
@@ -207,10 +209,14 @@ class _Reader:
 def _recorded(reader: _Reader, messages: Iterator[Message]) -> Iterator[Portion]:
     heard: list[Sample] = []
     chosen: GaugeChoice | None = None
+    people: Seen | None = None
     newest = -math.inf
     for message in messages:
         if message.topic == GAUGE:
             chosen = gauge_choice(message.data) or chosen
+            continue
+        if message.topic == PEOPLE:
+            people = _people(message.data) or people
             continue
         if message.topic != CYCLE:
             # What could not be decoded then cannot be now: the cycle's message counts it.
@@ -221,17 +227,22 @@ def _recorded(reader: _Reader, messages: Iterator[Message]) -> Iterator[Portion]
             cycle = document(message.data)
             own = float(cycle["time"])
             number = int(cycle["cycle"])
-            inputs = _inputs(tuple(heard), cycle, chosen)
+            inputs = _inputs(tuple(heard), cycle, chosen, people)
         except (ValueError, TypeError, KeyError):
             reader.session.note("a cycle's message cannot be read; its portion joins the next")
             continue
         local = reader.local(message.time)
         newest = max(newest, own if abs(own - local) <= SET else local)
-        heard, chosen = [], None
+        heard, chosen, people = [], None, None
         yield Portion(newest, message.time, inputs, number)
 
 
-def _inputs(heard: tuple[Sample, ...], cycle: dict[str, Any], chosen: GaugeChoice | None) -> Inputs:
+def _inputs(
+    heard: tuple[Sample, ...],
+    cycle: dict[str, Any],
+    chosen: GaugeChoice | None,
+    people: Seen | None,
+) -> Inputs:
     return Inputs(
         samples=heard,
         images=tuple(ImageStamp(**image) for image in cycle.get("images", ())),
@@ -241,6 +252,7 @@ def _inputs(heard: tuple[Sample, ...], cycle: dict[str, Any], chosen: GaugeChoic
         notices=tuple(Notice(**notice) for notice in cycle.get("notices", ())),
         driven=tuple(str(name) for name in cycle.get("driven", ())),
         gauge=chosen,
+        people=people,
     )
 
 
@@ -249,6 +261,14 @@ def gauge_choice(data: bytes) -> GaugeChoice | None:
     try:
         return checked(from_document(document(data)))
     except (ValueError, TypeError, KeyError, AttributeError, InputError):
+        return None
+
+
+def _people(data: bytes) -> Seen | None:
+    """What LiDARs saw, as a message has it; None for what is none."""
+    try:
+        return seen_of(document(data))
+    except (ValueError, TypeError, KeyError):
         return None
 
 

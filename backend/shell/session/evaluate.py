@@ -59,13 +59,14 @@ def merged(inputs: Iterable[Inputs]) -> Inputs:
     joined = {
         field.name: sum((getattr(one, field.name) for one in several), start=())
         for field in fields(Inputs)
-        if field.name not in ("lost", "notices", "driven", "gauge")
+        if field.name not in ("lost", "notices", "driven", "gauge", "people")
     }
     # Notices, and who is driven, are not events: those of the last cycle hold; and of the gauge
-    # what was chosen last.
+    # what was chosen last, and the newest of what LiDARs saw.
+    people = next((one.people for one in reversed(several) if one.people is not None), None)
     chosen = next((one.gauge for one in reversed(several) if one.gauge is not None), None)
     lost = sum(one.lost for one in several)
-    return replace(several[-1], **joined, lost=lost, gauge=chosen)
+    return replace(several[-1], **joined, lost=lost, gauge=chosen, people=people)
 
 
 def evaluate(

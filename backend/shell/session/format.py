@@ -33,6 +33,7 @@ OWN = "/cockpit/"
 CYCLE, CLOCK, SNAPSHOT = "/cockpit/cycle", "/cockpit/clock", "/cockpit/snapshot"
 ALARM, ACTION, MARKER = "/cockpit/alarm", "/cockpit/action", "/cockpit/marker"
 GAUGE = "/cockpit/gauge"
+PEOPLE = "/cockpit/people"
 
 _NUMBER, _TEXT, _COUNT = {"type": "number"}, {"type": "string"}, {"type": "integer", "minimum": 0}
 _COUNTS = {
@@ -73,6 +74,15 @@ SCHEMAS: dict[str, dict[str, Any]] = {
     ),
     # what operators chose of the working gauge, when it changed and once a second, site frame [m]
     GAUGE: _object("GaugeChoice", {"drawn": {"type": "array"}, "switched": {"type": "object"}}, {}),
+    # what the LiDARs' process told: tracks of people and objects, site frame [m], local times [s]
+    PEOPLE: _object(
+        "People",
+        {"time": _NUMBER, "ready": _NUMBER, "sensors": {"type": "array"}, "id": {"type": "array"}},
+        {
+            name: {"type": "array"}
+            for name in ("status", "state", "cov", "ahead", "ahead_cov", "last_seen", "lost")
+        },
+    ),
     SNAPSHOT: _object("Snapshot", {"time": _NUMBER, "cycle": _COUNT, "machines": {}}, {}),
     ALARM: _object("Alarms", {"alarms": {"type": "array"}}, {}),
     # what an operator did on a page

@@ -33,6 +33,7 @@ from backend.pipeline.records import (
 )
 from backend.safety.alarms import Alarm
 from backend.safety.record import Concern, Evidence, Level
+from backend.shell.session.recorded_people import recorded_people
 from backend.site.gauge_choice import NO_CHOICE, GaugeChoice
 from backend.spatial.types import Array
 
@@ -102,6 +103,7 @@ def _snapshot(document: Document, config: Config) -> Snapshot:
             if name in known
         },
         notices=tuple(Notice(**notice) for notice in document.get("notices", ())),
+        people=recorded_people(document.get("people"), float(document["time"]), config),
     )
 
 

@@ -28,12 +28,14 @@ from backend.shell.session.format import (
     CYCLE,
     GAUGE,
     MARKER,
+    PEOPLE,
     SNAPSHOT,
     dumps,
     stamp,
 )
 from backend.shell.session.keeper import Plan, run
 from backend.shell.session.near_miss import NearMiss, NearMisses
+from backend.shell.session.people_message import people_message
 from backend.site.gauge_choice import as_document
 
 ACTIONS = 50  # recorded in a second, at most
@@ -93,6 +95,9 @@ class Recorder:
         if inputs.gauge is not None:
             chosen = dumps(as_document(inputs.gauge))
             entries.append((GAUGE, "", stamp(snapshot.time, offset), chosen))
+        if inputs.people is not None:
+            told = msgspec.json.encode(people_message(inputs.people))
+            entries.append((PEOPLE, "", stamp(snapshot.time, offset), told))
         entries.append((CYCLE, "", stamp(snapshot.time, offset), _cycle_text(inputs, snapshot)))
         self._feeder.put(entries)
         for miss in self._misses.update(snapshot):

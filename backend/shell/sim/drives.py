@@ -80,7 +80,7 @@ def machine_of(model: str) -> Machine:
 
 
 @dataclass
-class _Machine:
+class Simulated:
     """One simulated machine with its agent and its two radios."""
 
     name: str
@@ -118,7 +118,7 @@ def drive(
     machines = [machine_of(model) for model in plan.models]
     states = start or placed(machines, rng)
     fleet = [
-        _machine(name, machine, state, site, plan.seed)
+        simulated(name, machine, state, site, plan.seed)
         for name, machine, state in zip(NAMES, machines, states, strict=True)
     ]
     config = Config(
@@ -141,9 +141,9 @@ def drive(
     for tick in range(1, round(plan.seconds / DT) + 1):
         t = tick * DT
         for one in fleet:
-            _obey(one, t)
+            obey(one, t)
             if plan.limited:
-                samples += _report(one, t, radios[0], plan, rng)
+                samples += report(one, t, radios[0], plan, rng)
         if plan.limited and t >= clock_due - 1e-9:
             clock_due += 0.5
             # As in the live simulation, the clock is asked past the radio.
@@ -156,7 +156,7 @@ def drive(
                 pipeline, snapshot = step(pipeline, inputs, t, config)
                 samples = []
             for one, stick in zip(fleet, sticks, strict=True):
-                _command(one, stick.at(t), snapshot, t, radios[1], plan, rng, outcome)
+                command(one, stick.at(t), snapshot, t, radios[1], plan, rng, outcome)
         if t >= shown_due - 1e-9:
             shown_due += plan.shown
             outcome.path.append((fleet[0].path, fleet[1].path))
@@ -177,12 +177,12 @@ def drive(
     return outcome
 
 
-def _machine(name: str, machine: Machine, state: SimState, site: Site, seed: int) -> _Machine:
+def simulated(name: str, machine: Machine, state: SimState, site: Site, seed: int) -> Simulated:
     n = len(machine.joints)
     rig = sensors(machine, site)
     rng = np.random.default_rng((seed, 11, NAMES.index(name)))
     still = Demand(np.zeros(n), np.zeros(2))
-    return _Machine(
+    return Simulated(
         name,
         machine,
         state,
@@ -196,7 +196,7 @@ def _machine(name: str, machine: Machine, state: SimState, site: Site, seed: int
     )
 
 
-def _obey(one: _Machine, t: float) -> None:
+def obey(one: Simulated, t: float) -> None:
     """The agent and the machine, one step of simulated time."""
     if t % 0.25 < DT:  # the lease is held throughout: what is tested here is another thing
         kind = Kind.REFRESH if one.gate.lease.held(t) else Kind.REQUEST
@@ -219,8 +219,8 @@ def _obey(one: _Machine, t: float) -> None:
 HYDRAULICS = Hydraulics()
 
 
-def _report(
-    one: _Machine, t: float, radio: Radio, plan: Drive, rng: np.random.Generator
+def report(
+    one: Simulated, t: float, radio: Radio, plan: Drive, rng: np.random.Generator
 ) -> list[Sample]:
     """What arrives at the cockpit at t from this machine, after what it measures was sent."""
     for k, sensor in enumerate(one.rig):
@@ -239,8 +239,8 @@ def _report(
     return samples
 
 
-def _command(
-    one: _Machine,
+def command(
+    one: Simulated,
     sticks: Sticks,
     snapshot: Snapshot | None,
     t: float,

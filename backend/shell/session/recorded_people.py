@@ -1,0 +1,111 @@
+"""The people of a recorded snapshot document, as they were."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from backend.pipeline.config import Config
+from backend.pipeline.people_records import Judged, Missing, People, Sensor, Tracked
+from backend.safety.people import Risks
+from backend.safety.swing_risk import Risk
+from backend.spatial.types import Array
+from backend.tracking.records import Status
+
+Document = Mapping[str, Any]
+
+
+def recorded_people(document: Document | None, now: float, config: Config) -> People | None:
+    """None where nobody watched. now: the snapshot's time [s]. Raises KeyError, TypeError or
+    ValueError for what is missing or of the wrong kind.
+    """
+    if document is None:
+        return None
+    tracks = list(document["tracks"])
+    return People(
+        str(document["reason"]),
+        float(document["age"]),
+        tuple(
+            Sensor(
+                str(one["machine"]),
+                str(one["name"]),
+                now - float(one["age"]),
+                _place(one["position"]),
+                int(one["points"]),
+            )
+            for one in document["sensors"]
+        ),
+        _tracked(tracks),
+        tuple(
+            Missing(
+                int(one["id"]),
+                _place(one["position"]),
+                now - float(one["seen"]),
+                now - float(one["lost"]),
+            )
+            for one in document["lost"]
+        ),
+        {
+            name: _judged(name, document["risks"], config)
+            for name in config.own
+            if any(one["machine"] == name for one in document["risks"])
+        },
+    )
+
+
+def _tracked(tracks: list[Document]) -> Tracked:
+    k = len(tracks)
+
+    def column(shape: tuple[int, ...], *path: str) -> Array:
+        values = []
+        for one in tracks:
+            value: Any = one
+            for name in path:
+                value = value[name]
+            values.append(value)
+        return np.array(values, dtype=float).reshape(k, *shape)
+
+    return Tracked(
+        np.array([int(one["id"]) for one in tracks], dtype=np.int64),
+        tuple(str(one["kind"]) for one in tracks),
+        np.array([Status[str(one["status"]).upper()] for one in tracks], dtype=np.int64),
+        column((3,), "position"),
+        column((2,), "velocity"),
+        column((), "yaw"),
+        column((3,), "size"),
+        column((), "sigma"),
+        column((), "unseen"),
+        column((2,), "ahead", "position"),
+        column((2, 2), "ahead", "cov"),
+    )
+
+
+def _judged(name: str, risks: list[Document], config: Config) -> Judged:
+    own = [one for one in risks if one["machine"] == name]
+    bodies = {f"{name}:{body}": k for k, body in enumerate(config.machines[name].body_names)}
+    columns = {
+        key: np.array([float(one[key]) for one in own])
+        for key in ("distance", "ttc", "index", "ttc_ahead", "index_ahead")
+    }
+    nearest = tuple(str(one["body"]) for one in own)
+    return Judged(
+        columns["distance"],
+        nearest,
+        Risks(
+            np.array([bodies.get(body, 0) for body in nearest], dtype=np.int64),
+            columns["ttc"],
+            columns["index"],
+            columns["ttc_ahead"],
+            columns["index_ahead"],
+            np.array([Risk[str(one["level"])] for one in own], dtype=np.int64),
+            np.zeros(len(own), dtype=np.int64),
+        ),
+    )
+
+
+def _place(values: Any) -> tuple[float, float, float]:
+    x, y, z = (math.nan if value is None else float(value) for value in values)
+    return x, y, z
