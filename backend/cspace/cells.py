@@ -71,8 +71,8 @@ def _model(machine: ByIdentity[Machine], rest: tuple[float, ...], steps: int) ->
 def coded(
     models: CellModels, grid: JointGrid, layers: Mapping[str, Boxes], together: Boxes | None = None
 ) -> AnyArray:
-    """uint8 (swing, boom, stick, bucket) of a grid. layers: "partner", "site", "people" in the root frame;
-    together: all of their boxes, when they are at hand.
+    """uint8 (swing, boom, stick, bucket) of a grid. layers: "partner", "site", "people", in the
+    root frame; together: all of their boxes, when they are at hand.
     """
     cells = np.zeros(grid.shape, dtype=np.uint8)
     for name, boxes in layers.items():

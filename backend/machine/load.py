@@ -11,6 +11,7 @@ from backend.errors import InputError
 from backend.machine import bodies, defaults, sun_map
 from backend.machine.bodies import Progress
 from backend.machine.expand import urdf_text
+from backend.machine.lidars import mounts
 from backend.machine.limits import actuated_joint, read_joint_limits
 from backend.machine.meshes import visuals_of
 from backend.machine.model import PARTS, ROLES, Antenna, Joint, Link, Machine, Tracks
@@ -100,6 +101,7 @@ def load_machine(
         tracks=defaults.tracks(machine, side.tracks, notes),
         self_pairs=defaults.self_pairs(machine, side.self_collision, side_name, notes),
         eye=defaults.eye(machine, side.eye, side_name),
+        lidars=mounts(links, side.lidar, side_name),
     )
     if side.heading is None:
         notes.append("the heading sensor is taken to turn with the upper body")

@@ -123,6 +123,19 @@ class Eye:
 
 
 @dataclass(frozen=True)
+class LidarMount:
+    """A LiDAR and where it is mounted. name: of the frame that its clouds are in; link: index into
+    Machine.links; T_link_sensor: (4, 4), z is the axis it spins about; elevations: (b,) of its
+    beams [rad].
+    """
+
+    name: str
+    link: int
+    T_link_sensor: Array
+    elevations: Array
+
+
+@dataclass(frozen=True)
 class Tracks:
     """Travel of the tracks. length, gauge (centre to centre), shoe width [m]; speed [m/s]."""
 
@@ -158,6 +171,7 @@ class Machine:
     max_reach: float  # from the swing axis, joint limits ignored (Sun) [m]
     assumptions: tuple[str, ...] = field(default=())
     eye: Eye | None = None  # where the sidecar says it
+    lidars: tuple[LidarMount, ...] = ()
 
     @property
     def lower(self) -> Array:

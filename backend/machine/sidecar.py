@@ -18,6 +18,8 @@ Finite = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 Vector: TypeAlias = tuple[Finite, Finite, Finite]
 Matrix: TypeAlias = tuple[Vector, Vector, Vector]
+Elevation = Annotated[float, Field(ge=-90.0, le=90.0)]
+VLP_16 = tuple(float(elevation) for elevation in range(-15, 16, 2))
 Role = Literal["swing", "boom", "stick", "bucket", "tilt", "rotate"]
 
 
@@ -92,6 +94,19 @@ class SelfCollision(Table):
     rest_deg: tuple[dict[Role, Finite], ...] = ()
 
 
+class LidarTable(Table):
+    """One LiDAR. name: its clouds' frame_id; link: "base" is the URDF's root, "upper" what the
+    swing turns; xyz: lever arm [m], turned by rpy_deg as in a URDF, z is the axis it spins about;
+    elevations_deg: of its beams above the plane across that axis, as a VLP-16's by default.
+    """
+
+    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+$", max_length=64)] = "lidar"
+    link: Literal["upper", "base"] = "upper"
+    xyz: Vector
+    rpy_deg: Vector = (0.0, 0.0, 0.0)
+    elevations_deg: Annotated[tuple[Elevation, ...], Field(min_length=1, max_length=128)] = VLP_16
+
+
 class Sidecar(Table):
     """One machine's sidecar as read."""
 
@@ -107,6 +122,7 @@ class Sidecar(Table):
     tracks: TracksTable | None = None
     bodies: BodiesTable = BodiesTable()
     self_collision: SelfCollision = SelfCollision()
+    lidar: Annotated[tuple[LidarTable, ...], Field(max_length=8)] = ()
     cylinder: tuple[dict[str, object], ...] = ()  # checked by cylinders_read
 
 
@@ -151,6 +167,7 @@ def _fields_at(place: list[str]) -> list[str]:
         "limits": Limit,
         "bodies": BodiesTable,
         "self_collision": SelfCollision,
+        "lidar": LidarTable,
     }
     if place[:2] == ["bodies", "boxes"]:
         model = BoxTable

@@ -30,8 +30,8 @@ PARTNER, SITE, PEOPLE = "partner", "site", "people"
 
 @dataclass(frozen=True)
 class Surroundings:
-    """boxes: in the machine's root frame; names: "right:stick/0", "site:wall", "person:P7"; partner,
-    people: (n,) the box is of another machine, or somebody's, else of the site.
+    """boxes: in the machine's root frame; names: "right:stick/0", "site:wall", "person:P7";
+    partner, people: (n,) the box is of another machine, or somebody's, else of the site.
     """
 
     boxes: Boxes

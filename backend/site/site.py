@@ -14,6 +14,7 @@ from backend.errors import InputError
 from backend.fusion.crs import SiteFrame
 from backend.site.gauge_tables import Gauge
 from backend.site.messages import sentence
+from backend.site.moving import Person, Vehicle
 from backend.site.tables import (
     Hardware,
     Link,
@@ -35,7 +36,7 @@ SITES = Path(__file__).resolve().parents[2] / "scenes" / "sites"
 @dataclass(frozen=True)
 class Site:
     """A site as every room reads it. path: the file; relative paths in it are against `folder`;
-    can_map: the map of its CAN logs."""
+    can_map: the map of its CAN logs; people, vehicles: simulated ones."""
 
     path: Path
     name: str
@@ -53,6 +54,8 @@ class Site:
     can_map: Path | None = None
     gauge: Gauge = field(default_factory=Gauge)
     people: People | None = None
+    people: tuple[Person, ...] = ()
+    vehicles: tuple[Vehicle, ...] = ()
 
     @property
     def folder(self) -> Path:
@@ -131,6 +134,8 @@ def parse_site(data: dict[str, Any], path: Path) -> Site:
         can_map=path.resolve().parent / can_map if can_map else None,
         gauge=table.gauge,
         people=table.people,
+        people=table.person,
+        vehicles=table.vehicle,
     )
 
 

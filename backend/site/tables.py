@@ -24,6 +24,7 @@ from backend.site.base import (
 )
 from backend.site.cameras import MOST, Camera, as_list
 from backend.site.gauge_tables import Gauge
+from backend.site.moving import Person, Vehicle
 from backend.site.others import Can, MachineTopics, refuse_shared_topics
 from backend.spatial.rotation import rz
 from backend.spatial.types import Array, frozen
@@ -138,7 +139,9 @@ class SiteMachine(Table):
 
 
 class Hardware(Table):
-    """How simulated hardware publishes (Sun 2020, Section 5.1 and App. A). Periods, delays [s]."""
+    """How simulated hardware publishes (Sun 2020, Section 5.1 and App. A). Periods, delays [s];
+    lidar: whether the machines' LiDARs are simulated, which takes a twentieth of a processor each.
+    """
 
     joint_period: Annotated[float, Field(ge=0.001, le=10.0)] = 0.005
     position_period: Annotated[float, Field(ge=0.001, le=10.0)] = 0.05
@@ -148,6 +151,7 @@ class Hardware(Table):
     joint_noise_deg: NotNegative = 0.05
     radio_period: NotNegative = 0.040
     latency: NotNegative = 0.100
+    lidar: bool = False
 
 
 class Obstacle(Table):
@@ -247,6 +251,8 @@ class SiteTable(Table):
     sim: Hardware = Hardware()
     obstacle: tuple[Obstacle, ...] = ()
     obstacle_mesh: tuple[ObstacleMesh, ...] = ()
+    person: Annotated[tuple[Person, ...], Field(max_length=64)] = ()
+    vehicle: Annotated[tuple[Vehicle, ...], Field(max_length=64)] = ()
     link: Link = Link()
     recording: Recording = Recording()
     can: Can = Can()
@@ -258,6 +264,8 @@ class SiteTable(Table):
         _refuse_duplicates("machine", "name", [machine.name for machine in self.machine])
         obstacles = [o.name for o in self.obstacle] + [m.name for m in self.obstacle_mesh]
         _refuse_duplicates("obstacle", "name", obstacles)
+        _refuse_duplicates("person", "name", [person.name for person in self.person])
+        _refuse_duplicates("vehicle", "name", [vehicle.name for vehicle in self.vehicle])
         refuse_shared_topics((machine.name, machine.topics) for machine in self.machine)
         prefixes = sorted(machine.prefix + "/" for machine in self.machine)
         for shorter, longer in pairwise(prefixes):

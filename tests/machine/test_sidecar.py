@@ -10,6 +10,7 @@ from backend.machine.load import load_machine
 from backend.machine.sidecar import (
     BodiesTable,
     Heading,
+    LidarTable,
     SelfCollision,
     Sidecar,
     TracksTable,
@@ -179,5 +180,5 @@ def test_the_readme_shows_every_field(repository, tmp_path):
     side = read_sidecar(tmp_path / "example.toml")
     assert side.model_fields_set == set(Sidecar.model_fields) - {"cylinder"}
     assert "[[cylinder]]" in text
-    for table in (TracksTable, Heading, BodiesTable, SelfCollision):
+    for table in (TracksTable, Heading, BodiesTable, SelfCollision, LidarTable):
         assert all(f"{field} = " in example for field in table.model_fields)

@@ -51,14 +51,15 @@ def decode(machine: str, suffix: str, payload: bytes, arrival: float) -> Message
     if reader is None:
         raise DecodeError(f"{suffix} is not decoded into a record")
     try:
-        return reader(_message(row, payload), machine, arrival, fields)
+        return reader(message_of(row, payload), machine, arrival, fields)
     except DecodeError:
         raise
     except Exception as error:  # whatever strangers' bytes provoke in the decoder
         raise DecodeError(f"{suffix}: {error}") from error
 
 
-def _message(row: Topic, payload: bytes) -> Any:
+def message_of(row: Topic, payload: bytes) -> Any:
+    """The ROS 2 message in `payload`. Raises DecodeError, and for broken bytes anything else."""
     if not 4 < len(payload) <= row.max_bytes:
         raise DecodeError(f"{row.name}: {len(payload)} bytes, allowed are 5 to {row.max_bytes}")
     from backend.shell.link.typestore import TYPESTORE
@@ -66,7 +67,8 @@ def _message(row: Topic, payload: bytes) -> Any:
     return TYPESTORE.deserialize_cdr(payload, row.type)
 
 
-def _stamp(msg: Any) -> float:
+def stamp_of(msg: Any) -> float:
+    """[s] of a message's header. Raises DecodeError."""
     stamp = msg.header.stamp
     if stamp.sec < 0 or stamp.nanosec >= 1_000_000_000:
         raise DecodeError(f"stamp {stamp.sec} s + {stamp.nanosec} ns is no time")
@@ -83,11 +85,12 @@ def _names(
         if len(values) != len(names) and not (what in may_be_empty and len(values) == 0):
             raise DecodeError(f"{len(values)} values of {what} for {len(names)} names")
     for name in names:
-        _text(name)
+        text_of(name)
     return tuple(names)
 
 
-def _text(text: str) -> str:
+def text_of(text: str) -> str:
+    """`text` as it is. Raises DecodeError when it is too long."""
     if len(text) > MAX_TEXT:
         raise DecodeError(f"a text of {len(text)} characters, allowed are {MAX_TEXT}")
     return text
@@ -104,7 +107,7 @@ def _joints(msg: Any, machine: str, arrival: float, _: dict[str, str]) -> JointS
     arrays = {"position": msg.position, "velocity": msg.velocity, "effort": msg.effort}
     names = _names(msg.name, arrays, may_be_empty=("velocity", "effort"))
     return JointSample(
-        machine, _stamp(msg), arrival, names, _array(msg.position), _array(msg.velocity)
+        machine, stamp_of(msg), arrival, names, _array(msg.position), _array(msg.velocity)
     )
 
 
@@ -137,7 +140,7 @@ def _fix(msg: Any, machine: str, arrival: float, _: dict[str, str]) -> FixSample
         covariance = np.zeros((3, 3))
     return FixSample(
         machine,
-        _stamp(msg),
+        stamp_of(msg),
         arrival,
         float(msg.latitude),
         float(msg.longitude),
@@ -149,7 +152,7 @@ def _fix(msg: Any, machine: str, arrival: float, _: dict[str, str]) -> FixSample
 
 def _projected(msg: Any, machine: str, arrival: float, _: dict[str, str]) -> ProjectedSample:
     position = _array([msg.point.x, msg.point.y, msg.point.z])
-    return ProjectedSample(machine, _stamp(msg), arrival, position, np.zeros((3, 3)))
+    return ProjectedSample(machine, stamp_of(msg), arrival, position, np.zeros((3, 3)))
 
 
 def _orientation(msg: Any) -> Array:
@@ -174,16 +177,16 @@ def _heading(msg: Any, machine: str, arrival: float, _: dict[str, str]) -> Headi
         raise DecodeError("gnss/heading: covariance -1 says that there is no orientation")
     yaw = to_attitude(from_quaternion(_orientation(msg)))[0]
     variance = _variance(msg.orientation_covariance, 8)
-    return HeadingSample(machine, _stamp(msg), arrival, float(yaw), variance)
+    return HeadingSample(machine, stamp_of(msg), arrival, float(yaw), variance)
 
 
 def _attitude(msg: Any, machine: str, arrival: float, fields: dict[str, str]) -> AttitudeSample:
     rate = msg.angular_velocity
     return AttitudeSample(
         machine,
-        _stamp(msg),
+        stamp_of(msg),
         arrival,
-        _text(fields["link"]),
+        text_of(fields["link"]),
         _orientation(msg),
         _array([rate.x, rate.y, rate.z]),
         _variance(msg.orientation_covariance, 0, 4),
@@ -197,11 +200,11 @@ def _command(msg: Any, machine: str, arrival: float, _: dict[str, str]) -> Comma
         names = _names(msg.name, {"velocity": msg.velocity}, may_be_empty=())
     return Command(
         machine,
-        _stamp(msg),
+        stamp_of(msg),
         arrival,
         int(msg.sequence),
         float(msg.time_to_live),
-        _text(msg.holder),
+        text_of(msg.holder),
         int(msg.token),
         names,
         _array(msg.velocity),
@@ -213,10 +216,10 @@ def _command(msg: Any, machine: str, arrival: float, _: dict[str, str]) -> Comma
 def _status(msg: Any, machine: str, arrival: float, _: dict[str, str]) -> AgentStatus:
     return AgentStatus(
         machine,
-        _stamp(msg),
+        stamp_of(msg),
         arrival,
-        _text(msg.mode),
-        _text(msg.holder),
+        text_of(msg.mode),
+        text_of(msg.holder),
         int(msg.token),
         int(msg.sequence),
         float(msg.command_age),
@@ -231,7 +234,7 @@ def _truth(msg: Any, machine: str, arrival: float, _: dict[str, str]) -> TrueSta
     names = _names(msg.name, arrays, may_be_empty=())
     return TrueState(
         machine,
-        _stamp(msg),
+        stamp_of(msg),
         arrival,
         names,
         _array(msg.position),
@@ -273,12 +276,12 @@ def decode_clock(payload: bytes) -> float:
 def decode_limits(machine: str, payload: bytes, arrival: float) -> MotionLimits:
     """The motion limits in `payload`; arrival: local clock [s]. Raises DecodeError."""
     try:
-        msg = _message(topic("limits"), payload)
+        msg = message_of(topic("limits"), payload)
         arrays = {"negative": msg.negative, "positive": msg.positive}
         names = _names(msg.name, arrays, may_be_empty=())
         return MotionLimits(
             machine,
-            _stamp(msg),
+            stamp_of(msg),
             arrival,
             int(msg.sequence),
             float(msg.time_to_live),
@@ -296,8 +299,8 @@ def decode_limits(machine: str, payload: bytes, arrival: float) -> MotionLimits:
 def decode_picture(payload: bytes) -> tuple[float, bytes]:
     """The stamp [s] and the JPEG of an answer to a question for a picture. Raises DecodeError."""
     try:
-        msg = _message(topic("camera"), payload)
-        stamp, jpeg = _stamp(msg), bytes(msg.data)
+        msg = message_of(topic("camera"), payload)
+        stamp, jpeg = stamp_of(msg), bytes(msg.data)
     except DecodeError:
         raise
     except Exception as error:  # whatever strangers' bytes provoke in the decoder

@@ -10,7 +10,7 @@ import numpy as np
 from backend.fusion.samples import Fix
 from backend.shell.link.messages import AgentStatus, Command, MotionLimits, TrueState
 from backend.shell.link.typestore import TYPESTORE
-from backend.spatial.types import Array
+from backend.spatial.types import AnyArray, Array
 
 _Time = TYPESTORE.types["builtin_interfaces/msg/Time"]
 _Header = TYPESTORE.types["std_msgs/msg/Header"]
@@ -22,6 +22,8 @@ _Imu = TYPESTORE.types["sensor_msgs/msg/Imu"]
 _NavSatFix = TYPESTORE.types["sensor_msgs/msg/NavSatFix"]
 _NavSatStatus = TYPESTORE.types["sensor_msgs/msg/NavSatStatus"]
 _Picture = TYPESTORE.types["sensor_msgs/msg/CompressedImage"]
+_PointCloud2 = TYPESTORE.types["sensor_msgs/msg/PointCloud2"]
+_PointField = TYPESTORE.types["sensor_msgs/msg/PointField"]
 _PointStamped = TYPESTORE.types["geometry_msgs/msg/PointStamped"]
 _Command = TYPESTORE.types["cockpit_msgs/msg/JointVelocityCommand"]
 _Limits = TYPESTORE.types["cockpit_msgs/msg/MotionLimits"]
@@ -57,6 +59,25 @@ def encode_clock(time: float) -> bytes:
 def encode_picture(stamp: float, frame: str, jpeg: bytes) -> bytes:
     """sensor_msgs/CompressedImage of a JPEG that shows the time `stamp` [s]."""
     return _bytes(_Picture(_header(stamp, frame), "jpeg", np.frombuffer(jpeg, dtype=np.uint8)))
+
+
+def encode_cloud(
+    stamp: float, sensor: str, points: AnyArray, intensity: AnyArray | None = None
+) -> bytes:
+    """sensor_msgs/PointCloud2 of float32. stamp: moment of the turn [s]; sensor: the mount's name;
+    points: (n, 3) in the sensor's frame [m]; intensity: (n,), left out when None.
+    """
+    names = ("x", "y", "z") if intensity is None else ("x", "y", "z", "intensity")
+    n, step = len(points), 4 * len(names)
+    columns = np.empty((n, len(names)), dtype="<f4")
+    columns[:, :3] = points
+    if intensity is not None:
+        columns[:, 3] = intensity
+    fields = [_PointField(name, 4 * k, 7, 1) for k, name in enumerate(names)]  # 7: FLOAT32
+    data = columns.reshape(-1).view(np.uint8)
+    return _bytes(
+        _PointCloud2(_header(stamp, sensor), 1, n, fields, False, step, n * step, data, True)
+    )
 
 
 def encode_joint_states(

@@ -21,6 +21,8 @@ PAINTS: AnyArray = np.array([[210, 195, 148], [159, 185, 204], [191, 176, 207], 
 IRON: AnyArray = np.array([58, 60, 64])
 STEEL: AnyArray = np.array([104, 108, 112])
 CONCRETE: AnyArray = np.array([150, 148, 142])
+CLOTH: AnyArray = np.array([228, 224, 206])
+LORRY: AnyArray = np.array([120, 132, 140])
 
 
 @dataclass(frozen=True)
@@ -35,9 +37,11 @@ class Seen:
 
 @dataclass(frozen=True)
 class Surroundings:
-    """What stands still on the site, in the site frame."""
+    """What else is on the site, in the site frame. boxes: of what stands still."""
 
     boxes: Boxes = field(default_factory=lambda: NO_BOXES)
+    people: Boxes = field(default_factory=lambda: NO_BOXES)
+    vehicles: Boxes = field(default_factory=lambda: NO_BOXES)
 
 
 def eye_in_upper(machine: Machine) -> tuple[int, Array]:
@@ -78,10 +82,11 @@ def cab_view(
     everyone = (own, *others)
     boxes = [body_boxes(m.machine, link_poses(m.machine, m.q, m.T_site_root)) for m in everyone]
     colors = [_colors(m.machine, m.paint) for m in everyone]
-    still = np.tile(CONCRETE, (len(site.boxes), 1))
+    rest = ((site.boxes, CONCRETE), (site.people, CLOTH), (site.vehicles, LORRY))
+    colors += [np.tile(color, (len(of), 1)) for of, color in rest]
     T_site_camera = camera_pose(own.machine, own.q, own.T_site_root)
-    together = concatenated([*boxes, site.boxes])
-    return draw(lens or Lens(), T_site_camera, together, np.concatenate([*colors, still]))
+    together = concatenated([*boxes, *(of for of, _ in rest)])
+    return draw(lens or Lens(), T_site_camera, together, np.concatenate(colors))
 
 
 def _colors(machine: Machine, paint: int) -> AnyArray:

@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
 from backend.shell.sim.lidar_kernel import cast
 from backend.spatial.boxes import Boxes
+from backend.spatial.transform import apply
 from backend.spatial.types import Array, IntArray
 
 
@@ -55,12 +56,15 @@ class Person:
 
 
 class Scan(NamedTuple):
-    """points: (n, 3) as measured, in the frame of the scene [m]; hit: (n,) what each echo is of,
-    see `lidar_kernel.cast`.
-    """
+    """points: (n, 3) as measured [m]; hit: (n,) what each echo is of, see `lidar_kernel.cast`."""
 
     points: Array
     hit: IntArray
+
+
+Ground: TypeAlias = tuple[Array, float]
+"""Upward unit normal (3,) and offset [m]."""
+LEVEL: Ground = (np.array([0.0, 0.0, 1.0]), 0.0)
 
 
 def scan(
@@ -69,18 +73,31 @@ def scan(
     boxes: Boxes,
     people: tuple[Person, ...],
     rng: np.random.Generator,
-    ground: tuple[Array, float] = (np.array([0.0, 0.0, 1.0]), 0.0),
+    ground: Ground = LEVEL,
 ) -> Scan:
-    """One turn, as if everything stood still during it. T_site_sensor: (4, 4); ground: upward unit
-    normal (3,) and offset [m].
+    """One turn, as if everything stood still during it, in the frame of the scene. T_site_sensor:
+    (4, 4).
     """
+    seen = measured(lidar, T_site_sensor, boxes, people, rng, ground)
+    return Scan(apply(T_site_sensor, seen.points), seen.hit)
+
+
+def measured(
+    lidar: Lidar,
+    T_site_sensor: Array,
+    boxes: Boxes,
+    people: tuple[Person, ...],
+    rng: np.random.Generator,
+    ground: Ground = LEVEL,
+) -> Scan:
+    """The same in the frame of the sensor, as it tells it."""
     azimuths = np.arange(lidar.directions) * (2.0 * math.pi / lidar.directions)
     cylinders = np.concatenate([np.zeros((0, 5)), *(person.cylinders() for person in people)])
     R, origin = np.ascontiguousarray(T_site_sensor[:3, :3]), T_site_sensor[:3, 3].copy()
     far, hit = cast(
         origin,
         R,
-        lidar.elevations,
+        np.array(lidar.elevations),  # writable, as kernels are compiled for either kind
         azimuths,
         (boxes.centers, boxes.rotations, boxes.half_extents),
         cylinders,
@@ -89,7 +106,10 @@ def scan(
     )
     back = np.isfinite(far) & (rng.random(far.shape) >= lidar.lost)
     e, a = np.nonzero(back)
-    measured = far[back] + rng.normal(scale=lidar.noise, size=len(e))
-    ce, se = np.cos(lidar.elevations[e]), np.sin(lidar.elevations[e])
-    ways = np.stack([ce * np.cos(azimuths[a]), ce * np.sin(azimuths[a]), se], axis=1)
-    return Scan(origin + (measured[:, None] * ways) @ R.T, hit[back])
+    ranges = far[back] + rng.normal(scale=lidar.noise, size=len(e))
+    flat = ranges * np.cos(lidar.elevations)[e]
+    points = np.empty((len(e), 3))
+    points[:, 0] = flat * np.cos(azimuths)[a]
+    points[:, 1] = flat * np.sin(azimuths)[a]
+    points[:, 2] = ranges * np.sin(lidar.elevations)[e]
+    return Scan(points, hit[back])

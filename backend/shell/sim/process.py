@@ -29,6 +29,7 @@ from backend.shell.sim.program_file import load_program
 from backend.shell.sim.radio import OnAir, Radio, receive, send
 from backend.shell.sim.sensors import Sensor, sensors
 from backend.shell.sim.simulate import on_schedule
+from backend.shell.sim.turning import TurningLidars
 from backend.site.site import Site
 
 LONGEST_STEP = 0.005  # [s]
@@ -92,7 +93,7 @@ def run_machine(
     beside: Callable[[], Any] | None = None,
 ) -> None:
     """The real-time loop on an open session; returns when `until` is set. beside: opens another
-    session, on which the machine's camera hears of other machines."""
+    session, for the machine's camera and for its LiDARs, on which they hear of other machines."""
     # The computer's clock is read once: later corrections of it must not make time jump here.
     epoch = time.time() - time.monotonic()
     prefix = site.machine(name).prefix
@@ -116,14 +117,20 @@ def run_machine(
     def on_schedule_time() -> float:
         return time.monotonic() + epoch - start_at
 
+    def schedule(stamp: float) -> float:
+        return stamp - skew - start_at
+
     answering = session.declare_queryable(clock_key, on_clock)
     # Milliseconds since the epoch: a machine that is started again never issues a token twice.
     first = no_lease(int(1e3 * time.time()))
     ear = Ear(session, prefix, first, on_schedule_time, lambda: wire.cut)
-    camera = CabCamera(session, site, name, machine, lambda: wire.now, lambda: wire.cut, beside)
+    mine = session, site, name, machine
+    camera = CabCamera(*mine, lambda: wire.now, lambda: wire.cut, beside, schedule)
+    lidars = TurningLidars(*mine, lambda: wire.now, lambda: wire.cut, schedule, beside)
     try:
         _loop(site, name, machine, program, rig, wire, ear, epoch, start_at, until, skew)
     finally:
+        lidars.close()
         camera.close()
         ear.close()
         for declared in (answering, *wire.outlets.values()):
