@@ -19,6 +19,8 @@ from backend.cspace.reach_image import reach_image
 from backend.cspace.regions import regions
 from backend.machine.load import load_machine, shipped_machines
 from backend.machine.outline import outlines_of
+from backend.perception.detect import detect
+from backend.perception.lzf_kernel import expanded, expanded_size
 from backend.pipeline.along_cycle import Cycle
 from backend.pipeline.along_track import Placement, Question, along_track
 from backend.pipeline.place import place
@@ -32,6 +34,9 @@ from backend.site.named_bodies import SiteBodies
 from backend.spatial import rotation, transform
 from backend.spatial.boxes import Boxes
 from backend.spatial.types import Array
+from backend.tracking import tracker
+from backend.tracking.association import associate
+from backend.tracking.records import Detections
 
 
 def compile_kernels() -> None:
@@ -72,6 +77,21 @@ def compile_kernels() -> None:
     for base in (np.eye(4), tilted):
         driving_zone(machine, q, base, near, 0.1)
         turning_zone(machine, q, base, near, eta=0.1)
+    follow(near)
+
+
+def follow(machine: Boxes) -> None:
+    """From a cloud's bytes to tracks."""
+    packed = np.array([0, 65], np.uint8)
+    expanded(packed, int(expanded_size(packed)))
+    x, y = (grid.ravel() for grid in np.meshgrid(np.arange(9.0), np.arange(9.0)))
+    points = np.stack([x, y, np.zeros(81)], axis=1)
+    detect(points, np.zeros(3), machine)
+    tracks = tracker.nothing()
+    for k in range(2):
+        tracks = tracker.track(tracks, Detections(0.1 * k, np.zeros((1, 7)))).tracks
+    tracker.later(tracks, 1.0)
+    associate(np.ones((2, 2)))
 
 
 _GROUND: Array = np.stack(

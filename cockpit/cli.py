@@ -13,6 +13,7 @@ import typer
 
 from backend.errors import InputError
 from cockpit.cli_along import along
+from cockpit.cli_detect import detect
 from cockpit.cli_entry import (
     Cert,
     InsecureHttp,
@@ -320,6 +321,7 @@ app.command()(keys)
 app.command()(convert)
 app.command()(export)
 app.command()(gauge)
+app.command()(detect)
 app.command()(track)
 app.command()(along)
 

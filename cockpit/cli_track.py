@@ -14,7 +14,8 @@ def track(
         typer.Argument(
             metavar="IN.csv",
             help="Detections: header time,x,y plus any of z,yaw,length,width,height; rows of one "
-            "scan share their time, a scan without detections is one row with blank x,y.",
+            "scan share their time, a scan without detections is one row with blank x,y. Or KITTI "
+            "tracking labels (.txt).",
         ),
     ],
     out: Annotated[Path | None, typer.Option(help="CSV of tracks; printed without it.")] = None,
@@ -28,9 +29,14 @@ def track(
     coast: Annotated[
         float, typer.Option(help="How long a track that is not seen is kept [s].")
     ] = 3.0,
+    kitti: Annotated[
+        bool, typer.Option("--kitti", help="KITTI tracking labels, whatever the file's name.")
+    ] = False,
+    period: Annotated[float, typer.Option(help="From one KITTI frame to the next [s].")] = 0.1,
 ) -> None:
     """Follow people and objects through recorded detections, and say where they are in a second."""
     from backend.tracking.records import Settings
     from cockpit.track import run_track
 
-    run_track(source, out, sigma, Settings(detected=detected, clutter=clutter, coast=coast))
+    settings = Settings(detected=detected, clutter=clutter, coast=coast)
+    run_track(source, out, sigma, settings, kitti, period)

@@ -76,7 +76,7 @@ def make_config(site: Site, models: dict[str, Machine], own: tuple[str, ...], mo
     """The pipeline's configuration; `own` empty means every machine."""
     for name in own:
         site.machine(name)
-    if site.people is not None and not any(model.lidars for model in models.values()):
+    if site.watch is not None and not any(model.lidars for model in models.values()):
         raise InputError(
             f"{site.path}: people are watched for, but no machine has a LiDAR; needed is "
             "[[lidar]] in the sidecar of at least one."
@@ -90,7 +90,7 @@ def make_config(site: Site, models: dict[str, Machine], own: tuple[str, ...], mo
         eta=site.safety.eta,
         mode=mode,
         site=site_bodies(site),
-        people=None if site.people is None else Watch(**dict(site.people)),
+        people=None if site.watch is None else Watch(**dict(site.watch)),
     )
 
 

@@ -19,6 +19,7 @@ from backend.documents.assessment import AssessmentDocument
 from backend.documents.bench import BenchDocument
 from backend.documents.conversion import ConversionDocument, ExportDocument
 from backend.documents.cspace import CspaceDocument
+from backend.documents.detection import DetectionDocument
 from backend.documents.gauge import GaugeDocument
 from backend.documents.gauge_choice import GaugeChoiceFile, GaugeStateDocument
 from backend.documents.recordings import RecordingsDocument, RecoverDocument
@@ -34,6 +35,7 @@ SCHEMAS: dict[str, tuple[type[BaseModel], str]] = {
     "assess": (AssessmentDocument, "what assess prints"),
     "cspace": (CspaceDocument, "what cspace --json prints"),
     "gauge": (GaugeDocument, "what gauge --json prints"),
+    "detection": (DetectionDocument, "what detect --json prints"),
     "along": (AlongDocument, "what along --json prints"),
     "gauge-choice": (GaugeChoiceFile, "what operators draw and switch, as it is kept"),
     "gauge-state": (GaugeStateDocument, "/api/gauge"),

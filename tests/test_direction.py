@@ -52,7 +52,8 @@ ROOMS: dict[str, set[str]] = {
     "backend.shell": {"backend"},
     "backend.warm": {
         *("backend.pipeline", "backend.planning", "backend.cspace", "backend.collision"),
-        *("backend.machine", "backend.safety", "backend.site", "backend.spatial"),
+        *("backend.machine", "backend.perception", "backend.safety", "backend.site"),
+        *("backend.spatial", "backend.tracking"),
     },
     "cockpit": {"backend", "cockpit"},
 }

@@ -8,7 +8,7 @@ what was seen, so that its centre is where the person stands and not where the b
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -46,7 +46,7 @@ class Settings:
             raise InputError(f"detection: link is {self.link} m; allowed is 0.1 to 2 m.")
         if not 0.0 <= self.low < self.high:
             raise InputError("detection: 0 <= low < high is needed.")
-        if self.reach <= 0.0 or self.fewest < 1:
+        if not self.reach > 0.0 or self.fewest < 1:
             raise InputError("detection: reach must be above 0, fewest at least 1.")
 
 
@@ -121,6 +121,23 @@ def within(points: Array, machines: Boxes, settings: Settings) -> BoolArray:
         inside(np.ascontiguousarray(points), grown.centers, grown.rotations, grown.half_extents),
         dtype=bool,
     )
+
+
+def detect_above(
+    points: Array, origin: Array, machines: Boxes, settings: Settings | None = None
+) -> Stages:
+    """Objects in a scan whose ground was taken out before: every height counts, from the lowest
+    point within reach. Arguments as of `detect`.
+    """
+    settings = settings or Settings()
+    points = np.asarray(points, dtype=float)
+    lowest = 0.0
+    if points.ndim == 2 and points.shape[1] == 3:
+        finite = points[np.isfinite(points).all(axis=1)]
+        near = np.hypot(*(finite - origin)[:, :2].T) <= settings.reach
+        lowest = float(finite[near, 2].min()) if near.any() else 0.0
+    level = Plane(np.array([0.0, 0.0, 1.0]), lowest, 0.0)
+    return detect(points, origin, machines, replace(settings, low=0.0), level)
 
 
 def _objects(

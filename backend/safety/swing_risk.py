@@ -13,7 +13,10 @@ from enum import IntEnum
 import numpy as np
 
 from backend.spatial.angles import wrap
-from backend.spatial.types import Array, IntArray
+from backend.spatial.types import Array, BoolArray, IntArray
+
+_LARGEST = 1e9
+"""What is not smaller than this is no place, speed or length on a site: it is not known."""
 
 
 class Risk(IntEnum):
@@ -50,7 +53,7 @@ class Swing:
     @property
     def known(self) -> bool:
         """Whether all of it is a number: without, nothing is safe."""
-        return bool(np.isfinite([*vars(self).values()]).all())
+        return bool(_sane(np.array([*vars(self).values()])).all())
 
 
 def time_to_collision(swing: Swing, place: Array, velocity: Array, clearance: Array) -> Array:
@@ -61,9 +64,14 @@ def time_to_collision(swing: Swing, place: Array, velocity: Array, clearance: Ar
     the object's radius, along the circle through the object [m].
     """
     place, velocity = np.asarray(place, dtype=float), np.asarray(velocity, dtype=float)
+    clearance = np.asarray(clearance, dtype=float)
+    if not swing.known:
+        return np.zeros(len(place))
+    known = _sane(place).all(axis=1) & _sane(velocity).all(axis=1) & _sane(clearance)
+    place, velocity = np.where(known[:, None], place, 0.0), np.where(known[:, None], velocity, 0.0)
     far = np.maximum(np.linalg.norm(place, axis=1), 1e-9)
     turning = (place[:, 0] * velocity[:, 1] - place[:, 1] * velocity[:, 0]) / far**2
-    wide = np.asarray(clearance) / far
+    wide = np.where(known, clearance, 0.0) / far
     delta = np.arctan2(place[:, 1], place[:, 0]) - swing.angle
     best = np.full(len(place), np.inf)
     for side in (1.0, -1.0):
@@ -71,8 +79,6 @@ def time_to_collision(swing: Swing, place: Array, velocity: Array, clearance: Ar
         w, a = side * (swing.rate - turning), side * swing.acceleration
         best = np.minimum(best, reached(gap, w, a, speeding(swing)))
     overlapping = np.abs(wrap(delta)) <= wide
-    known = np.isfinite(place).all(axis=1) & np.isfinite(velocity).all(axis=1)
-    known &= np.isfinite(wide) & swing.known
     return np.where(overlapping | ~known, 0.0, best)
 
 
@@ -85,17 +91,23 @@ def warning_index(
     object's radius (k,), of `uncertainty` of sensors and control, and of `keep` [m]. Infinite while
     nothing needs to brake and more than the safety clearance is left, minus infinite within it.
     """
-    place = np.asarray(place, dtype=float)
+    place, radius = np.asarray(place, dtype=float), np.asarray(radius, dtype=float)
+    clearance = np.asarray(clearance, dtype=float)
+    if not (swing.known and _sane(np.array([uncertainty, keep])).all()):
+        return np.full(len(place), -np.inf)
+    known = _sane(place).all(axis=1) & _sane(radius) & _sane(clearance)
+    place = np.where(known[:, None], place, 0.0)
     far = np.maximum(np.linalg.norm(place, axis=1), 1e-9)
     delta = wrap(np.arctan2(place[:, 1], place[:, 0]) - swing.angle)
-    c = far * np.abs(delta) - clearance
-    braking = far * swing.rate**2 / (2.0 * swing.deceleration)
-    sine = (np.asarray(radius) + uncertainty + keep) / far
+    c = far * np.abs(delta) - np.where(known, clearance, 0.0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        braking = np.float64(swing.rate**2) * far / (2.0 * swing.deceleration)
+    sine = (np.where(known, radius, 0.0) + uncertainty + keep) / far
     safety = np.where(sine < 1.0, far * np.arcsin(np.minimum(sine, 1.0)), np.inf)
     left = c - safety
     with np.errstate(divide="ignore", invalid="ignore"):
         x = np.where(braking > 0.0, left / braking, np.where(left > 0.0, np.inf, -np.inf))
-    return np.where(np.isnan(x) | (not swing.known), -np.inf, x)
+    return np.where(np.isnan(x) | ~known, -np.inf, x)
 
 
 def risk(ttc: Array, index: Array, boundaries: Boundaries | None = None) -> IntArray:
@@ -104,6 +116,11 @@ def risk(ttc: Array, index: Array, boundaries: Boundaries | None = None) -> IntA
     emergency = ~((index > b.index[0]) & (ttc > b.ttc[0]))
     warning = ~((index > b.index[1]) & (ttc > b.ttc[1]))
     return np.where(emergency, Risk.EMERGENCY, np.where(warning, Risk.WARNING, Risk.SAFE))
+
+
+def _sane(values: Array) -> BoolArray:
+    """Whether each is a number, and one of this world."""
+    return np.asarray(np.abs(values) < _LARGEST)
 
 
 def speeding(swing: Swing) -> float:

@@ -53,7 +53,7 @@ class Site:
     recording: Recording
     can_map: Path | None = None
     gauge: Gauge = field(default_factory=Gauge)
-    people: People | None = None
+    watch: People | None = None
     people: tuple[Person, ...] = ()
     vehicles: tuple[Vehicle, ...] = ()
 
@@ -133,7 +133,7 @@ def parse_site(data: dict[str, Any], path: Path) -> Site:
         recording=table.recording,
         can_map=path.resolve().parent / can_map if can_map else None,
         gauge=table.gauge,
-        people=table.people,
+        watch=table.people,
         people=table.person,
         vehicles=table.vehicle,
     )

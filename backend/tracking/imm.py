@@ -7,14 +7,15 @@ Merwe 2000: lambda = a^2 (n + k) - n.
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
-from backend.spatial.angles import wrap
 from backend.spatial.types import Array
-from backend.tracking.motion import CT, CV, MODELS, RANDOM, Noise, jolts, moved, switching
-from backend.tracking.records import STATE, YAW
+from backend.tracking.imm_kernels import advance, forward, mix, unscent
+from backend.tracking.motion import CV, MODELS, RANDOM, Noise, jolts, moved, switching
+from backend.tracking.records import STATE
 
 ALPHA, BETA, KAPPA = 1.0, 2.0, 0.0
 _SPREAD = ALPHA**2 * (STATE + KAPPA)  # n + lambda
@@ -22,6 +23,8 @@ _MEAN = np.full(2 * STATE + 1, 0.5 / _SPREAD)
 _MEAN[0] = (_SPREAD - STATE) / _SPREAD
 _COV = _MEAN.copy()
 _COV[0] += 1.0 - ALPHA**2 + BETA
+_POINTS = _MEAN, _COV, _SPREAD
+_ALL = np.ones((MODELS, 1))
 
 
 class Modes(NamedTuple):
@@ -32,20 +35,26 @@ class Modes(NamedTuple):
     mode: Array
 
 
+class _Step(NamedTuple):
+    """F: of the linear models, (r, 11, 11); Q: noise, (r, 11, 11); change: (r, r)."""
+
+    F: Array
+    Q: Array
+    change: Array
+
+
+@lru_cache(maxsize=64)
+def _step(dt: float, noise: Noise) -> _Step:
+    """What a prediction by dt needs; scans come at few different intervals."""
+    F = np.zeros((MODELS, STATE, STATE))
+    for model in (CV, RANDOM):
+        F[model] = moved(model, np.eye(STATE), dt, noise).T
+    return _Step(F, jolts(dt, noise), switching(dt, noise))
+
+
 def mixed(modes: Modes, change: Array) -> Modes:
     """Each model's prior from all models' posteriors. change: (r, r), see `motion.switching`."""
-    joint = modes.mode[:, :, None] * change  # (n, i, j)
-    prior = joint.sum(axis=1)
-    weight = joint / np.maximum(prior[:, None, :], 1e-300)
-    mean = np.einsum("nij,nix->njx", weight, modes.mean)
-    first = modes.mean[:, :1, YAW]
-    turned = wrap(modes.mean[..., YAW] - first)
-    mean[..., YAW] = first + np.einsum("nij,ni->nj", weight, turned)
-    off = modes.mean[:, :, None] - mean[:, None]  # (n, i, j, 11)
-    off[..., YAW] = wrap(off[..., YAW])
-    cov = np.einsum("nij,nixy->njxy", weight, modes.cov)
-    cov += np.einsum("nij,nijx,nijy->njxy", weight, off, off)
-    return Modes(mean, cov, prior)
+    return Modes(*mix(*_plain(modes), change))
 
 
 def predicted(modes: Modes, dt: float, noise: Noise) -> Modes:
@@ -53,48 +62,40 @@ def predicted(modes: Modes, dt: float, noise: Noise) -> Modes:
 
     Two models are linear: sigma points would only repeat their exact result.
     """
-    mean, cov = modes.mean.copy(), modes.cov.copy()
-    for model in (CV, RANDOM):
-        F = moved(model, np.eye(STATE), dt, noise).T
-        mean[:, model] = modes.mean[:, model] @ F.T
-        cov[:, model] = F @ modes.cov[:, model] @ F.T
-    mean[:, CT], cov[:, CT] = unscented(modes.mean[:, CT], modes.cov[:, CT], dt, noise)
-    return Modes(mean, cov + jolts(dt, noise), modes.mode)
+    step = _step(dt, noise)
+    mean, cov = (np.array(values, dtype=float, order="C") for values in modes[:2])
+    forward(mean, cov, step.F, step.Q, _POINTS, dt, noise.turned)
+    return Modes(mean, cov, modes.mode)
+
+
+def foretold(modes: Modes, dt: float, noise: Noise, steps: int = 1) -> Modes:
+    """Mixed and predicted by dt [s], `steps` times."""
+    step = _step(dt, noise)
+    ready = tuple(_plain(modes))
+    found = advance(ready, step.change, step.F, step.Q, _POINTS, dt, noise.turned, steps)
+    return Modes(*found)
 
 
 def unscented(mean: Array, cov: Array, dt: float, noise: Noise) -> tuple[Array, Array]:
     """(n, 11), (n, 11, 11) of the turning model through sigma points."""
-    root = np.linalg.cholesky(_SPREAD * cov)  # (n, 11, 11)
-    columns = np.swapaxes(root, 1, 2)
-    points = np.concatenate(
-        [mean[:, None], mean[:, None] + columns, mean[:, None] - columns], axis=1
-    )
-    there = moved(CT, points, dt, noise)
-    out = np.einsum("s,nsx->nx", _MEAN, there)
-    off = there - out[:, None]
-    spread = np.einsum("s,nsx,nsy->nxy", _COV, off, off)
-    return out, 0.5 * (spread + np.swapaxes(spread, 1, 2))
+    mean, cov = np.ascontiguousarray(mean), np.ascontiguousarray(cov)
+    return unscent(mean, cov, *_POINTS, dt, noise.turned)  # type: ignore[no-any-return]
 
 
 def mixture(modes: Modes) -> tuple[Array, Array]:
     """(n, 11), (n, 11, 11) mean and covariance of all models together."""
-    mean = np.einsum("nr,nrx->nx", modes.mode, modes.mean)
-    first = modes.mean[:, :1, YAW]
-    turned = wrap(modes.mean[..., YAW] - first)
-    mean[:, YAW] = first[:, 0] + (modes.mode * turned).sum(axis=1)
-    off = modes.mean - mean[:, None]
-    off[..., YAW] = wrap(off[..., YAW])
-    cov = np.einsum("nr,nrxy->nxy", modes.mode, modes.cov)
-    return mean, cov + np.einsum("nr,nrx,nry->nxy", modes.mode, off, off)
+    mean, cov, _ = mix(*_plain(modes), _ALL)
+    return mean[:, 0], cov[:, 0]
+
+
+def _plain(modes: Modes) -> Modes:
+    """In memory as the kernels want them."""
+    return Modes(*(np.ascontiguousarray(values, dtype=float) for values in modes))
 
 
 def ahead(modes: Modes, horizon: float, noise: Noise, steps: int = 4) -> tuple[Array, Array]:
     """(n, 11), (n, 11, 11) where tracks will be after `horizon` [s], models changing on the way."""
-    dt = horizon / steps
-    change = switching(dt, noise)
-    for _ in range(steps):
-        modes = predicted(mixed(modes, change), dt, noise)
-    return mixture(modes)
+    return mixture(foretold(modes, horizon / steps, noise, steps))
 
 
 def born(place: Array, measured: tuple[int, ...], noise: Array, speed: float) -> Modes:

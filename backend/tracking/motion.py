@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from backend.spatial.types import Array
+from backend.tracking.motion_kernel import turned
 from backend.tracking.records import (
     HEIGHT,
     LENGTH,
@@ -32,7 +33,6 @@ from backend.tracking.records import (
 
 CV, CT, RANDOM = range(3)
 MODELS = 3
-_STRAIGHT = 1e-6  # turned angle below which the series is used [rad]
 
 
 @dataclass(frozen=True)
@@ -55,6 +55,9 @@ class Noise:
 
 def moved(model: int, x: Array, dt: float, noise: Noise) -> Array:
     """States (..., 11) after dt [s]."""
+    if model == CT:
+        rows = np.ascontiguousarray(x, dtype=float).reshape(-1, STATE)
+        return np.asarray(turned(rows, dt, noise.turned)).reshape(x.shape)
     out = x.copy()
     if model == RANDOM:
         kept = np.exp(-dt / noise.fade)
@@ -65,44 +68,24 @@ def moved(model: int, x: Array, dt: float, noise: Noise) -> Array:
         for speed in (VX, VY, VZ, TURN):
             out[..., speed] *= kept
         return out
+    out[..., PX] += dt * x[..., VX]
+    out[..., PY] += dt * x[..., VY]
     out[..., PZ] += dt * x[..., VZ]
-    if model == CV:
-        out[..., PX] += dt * x[..., VX]
-        out[..., PY] += dt * x[..., VY]
-        return out
-    # The turn rate fades; its mean over dt turns the velocity.
-    left = np.exp(-dt / noise.turned)
-    angle = noise.turned * (1.0 - left) * x[..., TURN]
-    small = np.abs(angle) < _STRAIGHT
-    safe = np.where(small, 1.0, angle)
-    ahead = dt * np.where(small, 1.0 - angle**2 / 6.0, np.sin(safe) / safe)
-    aside = dt * np.where(small, 0.5 * angle, (1.0 - np.cos(safe)) / safe)
-    sine, cosine = np.sin(angle), np.cos(angle)
-    vx, vy = x[..., VX], x[..., VY]
-    out[..., PX] += ahead * vx - aside * vy
-    out[..., PY] += aside * vx + ahead * vy
-    out[..., VX] = cosine * vx - sine * vy
-    out[..., VY] = sine * vx + cosine * vy
-    out[..., YAW] += angle
-    out[..., TURN] *= left
     return out
 
 
 def jolts(dt: float, noise: Noise) -> Array:
     """(r, 11, 11) covariance that each model's noise adds in dt [s]."""
     Q = np.zeros((MODELS, STATE, STATE))
-    block = np.array([[dt**3 / 3.0, dt**2 / 2.0], [dt**2 / 2.0, dt]])
-    for model in range(MODELS):
-        for p, v, density in (
-            (PX, VX, noise.acceleration[model]),
-            (PY, VY, noise.acceleration[model]),
-            (PZ, VZ, noise.vertical),
-        ):
-            Q[model][np.ix_((p, v), (p, v))] = density * block
-        Q[model, TURN, TURN] = noise.turn[model] * dt
-        Q[model, YAW, YAW] = noise.yaw * dt
-        for size in (LENGTH, WIDTH, HEIGHT):
-            Q[model, size, size] = noise.size * dt
+    acceleration = np.array(noise.acceleration)
+    for p, v, density in ((PX, VX, acceleration), (PY, VY, acceleration), (PZ, VZ, noise.vertical)):
+        Q[:, p, p] = density * (dt**3 / 3.0)
+        Q[:, p, v] = Q[:, v, p] = density * (dt**2 / 2.0)
+        Q[:, v, v] = density * dt
+    Q[:, TURN, TURN] = np.array(noise.turn) * dt
+    Q[:, YAW, YAW] = noise.yaw * dt
+    for size in (LENGTH, WIDTH, HEIGHT):
+        Q[:, size, size] = noise.size * dt
     return Q
 
 

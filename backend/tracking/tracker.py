@@ -15,8 +15,8 @@ import numpy as np
 from backend.errors import InputError
 from backend.spatial.types import Array, BoolArray, IntArray
 from backend.tracking.association import associate
-from backend.tracking.imm import Modes, ahead, born, mixed, mixture, predicted
-from backend.tracking.motion import MODELS, Noise, switching
+from backend.tracking.imm import Modes, ahead, born, foretold, mixture
+from backend.tracking.motion import MODELS, Noise
 from backend.tracking.records import (
     PX,
     PY,
@@ -99,10 +99,7 @@ def predict(tracks: Tracks, time: float, noise: Noise | None = None) -> Modes:
         return modes
     dt = time - tracks.time
     steps = math.ceil(dt / _LONGEST)
-    for _ in range(steps):
-        change = switching(dt / steps, noise)
-        modes = predicted(mixed(modes, change), dt / steps, noise)
-    return modes
+    return foretold(modes, dt / steps, noise, steps) if steps else modes
 
 
 def now(tracks: Tracks) -> tuple[Array, Array]:

@@ -17,6 +17,7 @@ from scipy.special import chdtri
 from backend.spatial.types import Array, BoolArray
 from backend.tracking.imm import Modes
 from backend.tracking.records import HEIGHT, LENGTH, PZ, WIDTH, YAW, Detections, Settings
+from backend.tracking.update_kernels import compare, update
 
 _BETWEEN = {PZ: 4.0, YAW: np.pi, LENGTH: 3.0, WIDTH: 3.0, HEIGHT: 3.0}
 """Within which the numbers of a false detection lie: clutter is spread evenly over it [m, rad]."""
@@ -39,21 +40,13 @@ def sight(modes: Modes, seen: Detections, settings: Settings) -> Sight:
     """How each model's prediction agrees with each detection; the gate is that of the model whose
     S has the largest determinant.
     """
-    h = list(seen.measured)
-    d = len(h)
-    off = seen.values[None, None] - modes.mean[:, :, None, h]
-    if YAW in h:
-        at = h.index(YAW)
-        off[..., at] = (off[..., at] + 0.5 * np.pi) % np.pi - 0.5 * np.pi
-    PH = modes.cov[..., h]  # (n, r, 11, d)
-    S = PH[:, :, h] + np.diag(seen.noise**2)
-    inverse = np.linalg.inv(S)
-    squared = np.einsum("nrkx,nrxy,nrky->nrk", off, inverse, off)
-    log_det = np.linalg.slogdet(S)[1]
-    likelihood = np.exp(-0.5 * (squared + log_det[..., None] + d * np.log(2.0 * np.pi)))
+    h = np.array(seen.measured)
+    arrays = (modes.mean, modes.cov, seen.values, seen.noise)
+    plain = [np.ascontiguousarray(values, dtype=float) for values in arrays]
+    off, gain, S, likelihood, squared, log_det = compare(*plain, h)
     widest = log_det.argmax(axis=1)
     nearest = np.take_along_axis(squared, widest[:, None, None], axis=1)[:, 0]
-    return Sight(off, PH @ inverse, S, likelihood, nearest <= _gate(d, settings.gate))
+    return Sight(off, gain, S, likelihood, nearest <= _gate(len(h), settings.gate))
 
 
 def ratios(modes: Modes, found: Sight, seen: Detections, settings: Settings) -> Array:
@@ -68,24 +61,9 @@ def ratios(modes: Modes, found: Sight, seen: Detections, settings: Settings) -> 
 
 def updated(modes: Modes, found: Sight, share: Array) -> Modes:
     """Modes after the detections. share: (n, k) probability that a detection is the track's."""
-    none = 1.0 - share.sum(axis=1)
-    weight = modes.mode[:, :, None] * found.likelihood  # (n, r, k)
-    total = np.maximum(weight.sum(axis=1, keepdims=True), 1e-300)
-    joint = share[:, None] * weight / total  # of model and detection
-    missed = none[:, None] * modes.mode
-    mode = joint.sum(axis=2) + missed
-    mode = np.maximum(mode, 1e-6)
-    mode /= mode.sum(axis=1, keepdims=True)
-    beta = joint / np.maximum(joint.sum(axis=2) + missed, 1e-300)[..., None]
-    some = beta.sum(axis=2)  # (n, r) probability of having been detected, by model
-    off = np.einsum("nrk,nrkx->nrx", beta, found.off)
-    mean = modes.mean + np.einsum("nrsx,nrx->nrs", found.gain, off)
-    spread = np.einsum("nrk,nrkx,nrky->nrxy", beta, found.off, found.off)
-    spread -= np.einsum("nrx,nry->nrxy", off, off)
-    middle = spread - some[..., None, None] * found.S
-    K = found.gain
-    cov = modes.cov + K @ middle @ np.swapaxes(K, 2, 3)
-    return Modes(mean, 0.5 * (cov + np.swapaxes(cov, 2, 3)), mode)
+    arrays = (modes.mean, modes.cov, modes.mode)
+    plain = [np.ascontiguousarray(values, dtype=float) for values in arrays]
+    return Modes(*update(*plain, found[:4], np.ascontiguousarray(share, dtype=float)))
 
 
 @lru_cache(maxsize=32)

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from swings import DT, END, cases, grazes, integrated
 
 from backend.safety.swing_risk import (
     Boundaries,
@@ -15,41 +16,6 @@ from backend.safety.swing_risk import (
     time_to_collision,
     warning_index,
 )
-
-END, DT = 8.0, 1e-3
-
-
-def integrated(swing: Swing, place: np.ndarray, velocity: np.ndarray, clearance: float) -> float:
-    """When the swing's line first comes within the clearance, by steps of DT; inf after END."""
-    t = np.arange(0.0, END, DT)
-    rate = swing.rate + swing.acceleration * t
-    if swing.acceleration > 0.0:
-        rate = np.minimum(rate, max(swing.fastest, swing.rate))
-    elif swing.acceleration < 0.0:
-        rate = np.maximum(rate, min(-swing.fastest, swing.rate))
-    middle = 0.5 * (rate[1:] + rate[:-1])
-    angle = swing.angle + np.concatenate([[0.0], np.cumsum(middle) * DT])
-    far = np.hypot(*place)
-    turning = (place[0] * velocity[1] - place[1] * velocity[0]) / far**2
-    away = np.arctan2(place[1], place[0]) + turning * t - angle
-    close = np.abs((away + np.pi) % (2 * np.pi) - np.pi) <= clearance / far
-    return float(t[np.argmax(close)]) if close.any() else np.inf
-
-
-def cases(count: int, seed: int):
-    rng = np.random.default_rng(seed)
-    for _ in range(count):
-        fastest = rng.uniform(0.3, 1.5)
-        swing = Swing(
-            rng.uniform(-np.pi, np.pi),
-            rng.uniform(-fastest, fastest),
-            rng.choice([0.0, rng.uniform(-1.0, 1.0)]),
-            fastest,
-            rng.uniform(0.3, 2.0),
-        )
-        far, at = rng.uniform(1.0, 9.0), rng.uniform(-np.pi, np.pi)
-        place = far * np.array([np.cos(at), np.sin(at)])
-        yield swing, place, rng.uniform(-2.0, 2.0, 2), rng.uniform(0.2, 1.0)
 
 
 def test_against_integration() -> None:
@@ -64,12 +30,6 @@ def test_against_integration() -> None:
                 swing, place, velocity, clearance
             )
             assert found <= true + DT  # never later than it happens
-
-
-def grazes(swing: Swing, place: np.ndarray, velocity: np.ndarray, clearance: float) -> bool:
-    """Whether a hair less or more of clearance decides."""
-    both = [integrated(swing, place, velocity, clearance + off) for off in (-2e-3, 2e-3)]
-    return abs(both[0] - both[1]) > 10 * DT or np.isinf(both[0]) != np.isinf(both[1])
 
 
 def test_by_hand() -> None:
@@ -127,8 +87,9 @@ def test_what_is_not_known_is_an_emergency() -> None:
 def test_a_swing_that_is_not_known_is_an_emergency(field: str, bad: float) -> None:
     swing = replace(Swing(0.0, 0.5, 0.1, 1.0, 1.0), **{field: bad})
     place, still, one = np.array([[0.0, 9.0]]), np.zeros((1, 2)), np.ones(1)
-    ttc = time_to_collision(swing, place, still, one)
-    index = warning_index(swing, place, one, one, 0.1, 0.1)
+    with np.errstate(all="raise"):
+        ttc = time_to_collision(swing, place, still, one)
+        index = warning_index(swing, place, one, one, 0.1, 0.1)
     assert (ttc[0], index[0]) == (0.0, -np.inf)
     assert risk(ttc, index)[0] == Risk.EMERGENCY
 
@@ -136,3 +97,33 @@ def test_a_swing_that_is_not_known_is_an_emergency(field: str, bad: float) -> No
 def test_a_clearance_that_is_not_known_is_an_emergency() -> None:
     swing, place = Swing(0.0, 0.5, 0.1, 1.0, 1.0), np.array([[0.0, 9.0]])
     assert time_to_collision(swing, place, np.zeros((1, 2)), np.array([np.nan]))[0] == 0.0
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf, 1e300])
+@pytest.mark.parametrize("what", ["place", "velocity", "clearance", "radius", "uncertainty"])
+def test_an_object_that_is_not_known_is_an_emergency_and_no_other(what: str, bad: float) -> None:
+    swing = Swing(0.0, 0.5, 0.1, 1.0, 1.0)
+    given = {
+        "place": np.array([[0.0, 9.0], [0.0, -9.0]]),
+        "velocity": np.zeros((2, 2)),
+        "clearance": np.ones(2),
+        "radius": np.ones(2),
+    }
+    uncertainty = bad if what == "uncertainty" else 0.1
+    if what in given:
+        given[what][0] = bad
+    place, velocity, clearance, radius = given.values()
+    with np.errstate(all="raise"):
+        ttc = time_to_collision(swing, place, velocity, clearance)
+        index = warning_index(swing, place, radius, clearance, uncertainty, 0.1)
+        levels = risk(ttc, index)
+    assert levels[0] == Risk.EMERGENCY
+    assert levels[1] == (Risk.EMERGENCY if what == "uncertainty" else Risk.SAFE)
+
+
+def test_a_swing_that_cannot_stop() -> None:
+    place, one = np.array([[0.0, 9.0]]), np.ones(1)
+    for rate, left in ((0.5, 0.0), (0.0, np.inf)):
+        with np.errstate(all="raise"):
+            index = warning_index(Swing(0.0, rate, 0.0, 1.0, 0.0), place, one, one, 0.1, 0.1)
+        assert index[0] == left
