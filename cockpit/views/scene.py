@@ -11,6 +11,8 @@ from cockpit.views.ground import GaugeNodes, Ground, ground_height, light
 from cockpit.views.inputs import SceneSite
 from cockpit.views.machines import MachineNodes
 from cockpit.views.nearest import PairNodes
+from cockpit.views.people import PeopleNodes, SeenPeople
+from cockpit.views.sight_nodes import SightNodes
 
 
 class Scene:
@@ -27,20 +29,32 @@ class Scene:
         }
         self._pairs = PairNodes(scene, site)
         self._gauge = GaugeNodes(scene, site)
+        self._people = PeopleNodes(scene)
+        self._sight = SightNodes(scene, site.machines)
 
     @property
     def ground(self) -> float:
         """Height of the ground [m]."""
         return self._ground.height if self._ground else 0.0
 
-    def update(self, snapshot: Snapshot, now: float, lost: float = 0.0) -> None:
-        """now: a monotonic clock [s]; lost: seconds without a snapshot, 0 while they come."""
+    def update(
+        self,
+        snapshot: Snapshot,
+        now: float,
+        lost: float = 0.0,
+        people: SeenPeople | None = None,
+    ) -> None:
+        """now: a monotonic clock [s]; lost: seconds without a snapshot, 0 while they come; people:
+        None where the site has no LiDAR.
+        """
         self._place_ground(snapshot)
         self._gauge.update(snapshot.gauge.choice)
         for name, nodes in self._machines.items():
             if name in snapshot.machines:
                 nodes.update(snapshot.machines[name], self.ground, now, lost)
         self._pairs.update(snapshot, now, lost)
+        self._people.update(people, snapshot.time, self.ground, now, lost)
+        self._sight.update(snapshot.machines, people is not None, self.ground, now)
 
     def _place_ground(self, snapshot: Snapshot) -> None:
         placed = {n: s.body for n, s in snapshot.machines.items() if s.body is not None}
