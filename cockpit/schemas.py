@@ -22,6 +22,7 @@ from backend.documents.cspace import CspaceDocument
 from backend.documents.detection import DetectionDocument
 from backend.documents.gauge import GaugeDocument
 from backend.documents.gauge_choice import GaugeChoiceFile, GaugeStateDocument
+from backend.documents.people import PeopleModel
 from backend.documents.recordings import RecordingsDocument, RecoverDocument
 from backend.documents.session import DiffDocument, SeriesDocument, SessionDocument
 from backend.documents.state import StateDocument
@@ -46,6 +47,7 @@ SCHEMAS: dict[str, tuple[type[BaseModel], str]] = {
     "recover": (RecoverDocument, "what recover --json prints"),
     "recording": (RecordingModel, "/api/recording"),
     "snapshot": (SnapshotModel, "/api/snapshot and the Zenoh key cockpit/snapshot"),
+    "people": (PeopleModel, "the key people of a snapshot"),
     "site": (SiteModel, "/api/site"),
     "health": (HealthModel, "/api/health"),
     "session": (SessionDocument, "/api/session"),

@@ -1,73 +1,104 @@
-"""People and objects around the machines as JSON, part of a snapshot's document."""
+"""People and objects that LiDARs see, as a snapshot's document has them under the key `people`."""
 
 from __future__ import annotations
 
-from typing import Any
+import math
+from typing import Literal
 
-from backend.pipeline.people_records import Judged, People, Tracked
-from backend.safety.swing_risk import Risk
-from backend.tracking.records import Status
+from pydantic import BaseModel, Field
 
+Point = tuple[float, float, float]
+Plane = tuple[float, float]
+LevelModel = Literal["SAFE", "WARNING", "EMERGENCY"]
+KindModel = Literal["person", "object"]
+LEAST_INDEX = -1000.0
+"""The warning index of what is within the safety clearance of a swing that brakes for nothing:
+minus infinity, which JSON has no number for, and null already says that nothing needs to brake."""
 
-def people_document(people: People, now: float) -> dict[str, Any]:
-    """Site frame, metres, radians and seconds; NaN and infinity where a value does not exist."""
-    tracked = people.tracked
-    return {
-        "reason": people.reason,
-        "age": people.age,
-        "sensors": [
-            {
-                "machine": sensor.machine,
-                "name": sensor.name,
-                "age": now - sensor.time,
-                "position": list(sensor.position),
-                "points": sensor.points,
-            }
-            for sensor in people.sensors
-        ],
-        "tracks": [_track(tracked, k) for k in range(len(tracked))],
-        "lost": [
-            {
-                "id": one.id,
-                "position": list(one.position),
-                "seen": now - one.seen,
-                "lost": now - one.lost,
-            }
-            for one in people.lost
-        ],
-        "risks": [
-            _risk(machine, judged, tracked, k)
-            for machine, judged in people.judged.items()
-            for k in range(len(judged.distance))
-        ],
-    }
+TTC = "time to collision with a swing [s]; null when it never comes"
+INDEX = (
+    "warning index x: braking distances left beyond the safety clearance; null when nothing needs "
+    f"to brake, {LEAST_INDEX:g} for minus infinity"
+)
 
 
-def _track(tracked: Tracked, k: int) -> dict[str, Any]:
-    return {
-        "id": int(tracked.id[k]),
-        "kind": tracked.kind[k],
-        "status": Status(int(tracked.status[k])).name.lower(),
-        "position": tracked.position[k].tolist(),
-        "velocity": tracked.velocity[k].tolist(),
-        "yaw": float(tracked.yaw[k]),
-        "size": tracked.size[k].tolist(),
-        "sigma": float(tracked.sigma[k]),
-        "unseen": float(tracked.unseen[k]),
-        "ahead": {"position": tracked.ahead[k].tolist(), "cov": tracked.ahead_cov[k].tolist()},
-    }
+class SensorModel(BaseModel):
+    """A LiDAR of a machine."""
+
+    machine: str
+    name: str
+    age: float | None = Field(description="since its newest scan [s]; null before the first")
+    position: Point = Field(description="of its newest scan, site frame [m]")
+    points: int = Field(ge=0, description="of its newest scan")
 
 
-def _risk(machine: str, judged: Judged, tracked: Tracked, k: int) -> dict[str, Any]:
-    risks = judged.risks
-    return {
-        "id": int(tracked.id[k]),
-        "machine": machine,
-        "body": judged.nearest[k],
-        "distance": float(judged.distance[k]),
-        "ttc": float(risks.ttc[k]),
-        "index": float(risks.index[k]),
-        "ttc_ahead": float(risks.ttc_ahead[k]),
-        "index_ahead": float(risks.index_ahead[k]),
-        "level": Risk(int(risks.level[k])).name,
-    }
+class AheadModel(BaseModel):
+    """Where a track will be in a second."""
+
+    position: Plane = Field(description="east, north in the site frame [m]")
+    cov: tuple[Plane, Plane] = Field(description="covariance of it [m^2]")
+
+
+class TrackModel(BaseModel):
+    """Somebody or something that is followed."""
+
+    id: int = Field(description="stays the same as long as it is followed")
+    kind: KindModel
+    status: Literal["confirmed", "coasting", "tentative"] = Field(
+        description="coasting: confirmed, but not in the newest scan; tentative: perhaps nobody"
+    )
+    position: Point = Field(description="middle of its box now, site frame [m]")
+    velocity: Plane = Field(description="east, north [m/s]")
+    yaw: float = Field(description="of its box, counter-clockwise from grid east [rad]")
+    size: Point = Field(description="length, width, height of its box [m]")
+    sigma: float = Field(ge=0.0, description="standard deviation of the place, larger axis [m]")
+    unseen: float = Field(ge=0.0, description="since it was last detected [s]")
+    ahead: AheadModel
+
+
+class LostModel(BaseModel):
+    """A confirmed track that was given up near a machine: it may still be there."""
+
+    id: int
+    position: Point = Field(description="where it was last seen, site frame [m]")
+    seen: float = Field(ge=0.0, description="how long ago it was last seen [s]")
+    lost: float = Field(ge=0.0, description="how long ago it was given up [s]")
+
+
+class RiskModel(BaseModel):
+    """What one track means for one machine (Rasul 2021, Section 4)."""
+
+    id: int = Field(description="of the track")
+    machine: str
+    body: str = Field(description="the nearest of the machine, machine:part/number; empty without")
+    distance: float | None = Field(description="to that body in 3D [m]; null is unknown")
+    ttc: float | None = Field(ge=0.0, description=f"now: {TTC}")
+    index: float | None = Field(ge=LEAST_INDEX, description=f"now: {INDEX}")
+    ttc_ahead: float | None = Field(ge=0.0, description=f"in a second: {TTC}")
+    index_ahead: float | None = Field(ge=LEAST_INDEX, description=f"in a second: {INDEX}")
+    level: LevelModel = Field(
+        description="EMERGENCY stops the dangerous direction, WARNING slows and sounds"
+    )
+
+
+class PeopleModel(BaseModel):
+    """People and objects that LiDARs see. A track near a machine never goes without a word."""
+
+    reason: str = Field(description="why people are not known, else empty")
+    age: float | None = Field(description="since the newest scan [s]; null before the first")
+    sensors: list[SensorModel]
+    tracks: list[TrackModel]
+    lost: list[LostModel] = Field(description='"last seen here"')
+    risks: list[RiskModel] = Field(description="by track and machine; empty while unknown")
+
+
+def index_number(x: float) -> float:
+    """A warning index as the document has it: infinity becomes null in JSON, so that what is minus
+    infinity, and what is not a number and counts as that, must be a number.
+    """
+    return LEAST_INDEX if math.isnan(x) else max(x, LEAST_INDEX)
+
+
+def ttc_number(seconds: float) -> float:
+    """A time to collision as the document has it: what is not a number counts as now."""
+    return 0.0 if math.isnan(seconds) else seconds

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from backend.documents.people import people_document
+from backend.documents.people_document import people_document
 from backend.machine.model import Machine
 from backend.machine.outline import outlines_of
 from backend.machine.sun_map import sun_angles

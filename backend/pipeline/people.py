@@ -130,8 +130,9 @@ def largest(cov: Array) -> Array:
 
 
 def name_of(tracked: Tracked, k: int) -> str:
-    """ "person:P7"."""
-    return f"{tracked.kind[k]}:P{tracked.id[k]}"
+    """ "person:P7", "object:O9"."""
+    kind = tracked.kind[k]
+    return f"{kind}:{kind[0].upper()}{tracked.id[k]}"
 
 
 def counts(tracked: Tracked) -> BoolArray:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from backend.machine.model import Machine
-from backend.safety import site
+from backend.safety import people_words, site
 from backend.safety.partner import part
 from backend.safety.record import Concern, Level
 
@@ -39,6 +39,8 @@ def line(concern: Concern, labels: dict[str, str]) -> str:
     if concern.level is Level.UNKNOWN or evidence is None or not evidence.other:
         return _fit(f"{concern.level.name} · {concern.reason}")
     own = labels.get(concern.machine, concern.machine.upper())
+    if concern.name == people_words.NAME:
+        return _fit(people_words.line(concern.level.name, own, evidence))
     other_machine, _, _ = evidence.other.partition(":")
     other = f"{labels.get(other_machine, other_machine.upper())} {part(evidence.other)}"
     if concern.name == site.NAME:
@@ -49,8 +51,10 @@ def line(concern: Concern, labels: dict[str, str]) -> str:
 
 def detail(concern: Concern, machine: Machine, labels: dict[str, str]) -> str:
     """What is limited and which levers are free."""
+    own = labels.get(concern.machine, concern.machine.upper())
+    if concern.name == people_words.NAME:
+        return people_words.detail(concern, own, tuple(directions(machine).values()))
     if concern.level is Level.UNKNOWN:
-        own = labels.get(concern.machine, concern.machine.upper())
         return f"Clearance unknown: do not move {own}. Check radio and sensors of the one named."
     limited, free = [], []
     for joint, allowed, words in zip(

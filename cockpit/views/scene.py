@@ -11,6 +11,9 @@ from cockpit.views.ground import GaugeNodes, Ground, ground_height, light
 from cockpit.views.inputs import SceneSite
 from cockpit.views.machines import MachineNodes
 from cockpit.views.nearest import PairNodes
+from cockpit.views.people import PeopleNodes
+from cockpit.views.people_seen import seen_people
+from cockpit.views.sight_nodes import SightNodes
 
 
 class Scene:
@@ -27,13 +30,20 @@ class Scene:
         }
         self._pairs = PairNodes(scene, site)
         self._gauge = GaugeNodes(scene, site)
+        self._people = PeopleNodes(scene)
+        self._sight = SightNodes(scene, site.machines)
 
     @property
     def ground(self) -> float:
         """Height of the ground [m]."""
         return self._ground.height if self._ground else 0.0
 
-    def update(self, snapshot: Snapshot, now: float, lost: float = 0.0) -> None:
+    def update(
+        self,
+        snapshot: Snapshot,
+        now: float,
+        lost: float = 0.0,
+    ) -> None:
         """now: a monotonic clock [s]; lost: seconds without a snapshot, 0 while they come."""
         self._place_ground(snapshot)
         self._gauge.update(snapshot.gauge.choice)
@@ -41,6 +51,11 @@ class Scene:
             if name in snapshot.machines:
                 nodes.update(snapshot.machines[name], self.ground, now, lost)
         self._pairs.update(snapshot, now, lost)
+        self._people.update(
+            seen_people(snapshot.people, snapshot.time), snapshot.time, self.ground, now, lost
+        )
+        watched = snapshot.people is not None
+        self._sight.update(snapshot.machines, watched, self.ground, now)
 
     def _place_ground(self, snapshot: Snapshot) -> None:
         placed = {n: s.body for n, s in snapshot.machines.items() if s.body is not None}

@@ -23,6 +23,8 @@ import { bars } from "./plots/bars.js";
 import { limits } from "./plots/limits.js";
 import { trends } from "./plots/trends.js";
 import * as along from "./plots/along.js";
+import * as people from "./plots/people.js";
+import * as status from "./people/status.js";
 import { timeline } from "./plots/timeline.js";
 import * as player from "./player.js";
 import * as session from "./session.js";
@@ -146,7 +148,10 @@ player.startPlayer(socket.send);
 transport.startTransport();
 recording.startRecording();
 startSeries(plots.trends);
-along.startAlong(socket.send, () => Object.assign(plots.trends, { dirty: true, last: -Infinity }));
+const redrawTrends = () => Object.assign(plots.trends, { dirty: true, last: -Infinity });
+along.startAlong(socket.send, redrawTrends);
+people.startPeople(redrawTrends);
+status.startStatus();
 gauge.startGauge();
 drive.startDriving(socket.send);
 
@@ -180,6 +185,8 @@ function tick() {
   session.refresh();
   transport.update();
   along.update();
+  people.update();
+  status.update();
   sheets.update();
   recording.update();
   drive.update();
@@ -196,7 +203,7 @@ function tick() {
   heads.plan.who(`${subject}`);
   heads.reach.who(subject);
   for (const name of ["bars", "limits"]) heads[name].who(subject);
-  heads.trends.who(state.partner && !along.shown() ? `${subject} ↔ ${label(state.partner)}` : subject);
+  heads.trends.who(state.partner && !along.shown() && !people.shown() ? `${subject} ↔ ${label(state.partner)}` : subject);
   for (const name of ["scene", "plan", "bars", "limits", "trends", "timeline"]) heads[name].age(age);
   const forced = Boolean(present) && imageStale(present);
   for (const name of ["reach", "slice-0", "slice-1", "slice-2"]) heads[name].age(present || far() === null ? old : age, forced);

@@ -1,6 +1,7 @@
 // The last minute, as trends and the timeline draw it: distances, ages, alarms that came and went.
 
 import { alarms, atLeast, machine, names, pair, state } from "./state.js";
+import { forgetPeople, rememberPeople } from "./people/model.js";
 
 const HISTORY = 60; // seconds
 
@@ -10,12 +11,14 @@ let touching = false;
 export function forgetHistory() {
   state.history.length = 0;
   state.events.length = 0;
+  forgetPeople();
   lastHistory = -Infinity;
 }
 
 /** Called with every snapshot. */
 export function remember() {
   const s = state.snapshot;
+  rememberPeople();
   const p = pair(state.own, state.partner);
   const distance = atLeast(p);
   for (const { distance: d } of s.pairs) if (d !== null && d < state.closest) state.closest = d;

@@ -5,9 +5,13 @@ import { replaying } from "./state.js";
 import { drop, playback, seek } from "./player.js";
 import { session, zoom } from "./session.js";
 import { choice, timeAt } from "./plots/series.js";
+import { shown as people } from "./plots/people.js";
 import { seekable } from "./plots/seekable.js";
 
 const SPANS = [null, 600, 60]; // s
+
+// People in its place are of the last seconds only.
+const at = (x) => (people() ? NaN : timeAt(x));
 
 export function startSeries(surface) {
   const redraw = () => Object.assign(surface, { dirty: true, last: -Infinity });
@@ -28,16 +32,16 @@ export function startSeries(surface) {
     words();
   });
   surface.canvas.addEventListener("wheel", (event) => {
-    const t = timeAt(event.offsetX);
+    const t = at(event.offsetX);
     if (!replaying() || !Number.isFinite(t)) return;
     event.preventDefault();
     zoom((session.span ?? playback().duration) * 2 ** (Math.sign(event.deltaY) * 0.5), t);
     words();
   }, { passive: false });
   surface.canvas.addEventListener("dblclick", () => {
-    if (!replaying()) return;
+    if (!replaying() || people()) return;
     zoom(null);
     words();
   });
-  seekable(surface, timeAt, { seek, drop, redraw });
+  seekable(surface, at, { seek, drop, redraw });
 }

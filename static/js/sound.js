@@ -74,7 +74,8 @@ export function sound(alarms, approaching) {
   const key = keyOf(loud);
   const repeats = loud.level === "STOP" ? 2000 : loud.level === "UNKNOWN" ? 6000 : Infinity;
   if (key === lastKey && now - lastTime < repeats) return;
-  if (loud.level === "SLOW" && !approaching) return;
+  // People walk by themselves: they sound whether or not anybody pushes.
+  if (loud.level === "SLOW" && !approaching && loud.name !== "people") return;
   lastKey = key;
   lastTime = now;
   if (on && !(replaying() && !state.snapshot.playback?.playing) && context?.state === "running") PATTERNS[loud.level]?.();

@@ -141,7 +141,7 @@ export const noImage = () => (far() === null ? "no image yet" : `${label(state.p
 export const silence = () => (performance.now() - state.arrival) / 1000;
 
 /** What waiting adds to ages. Recorded data grow no older while the player answers, paused or not. */
-const waited = () => (replaying() && silence() <= 1 ? 0 : silence());
+export const waited = () => (replaying() && silence() <= 1 ? 0 : silence());
 
 /** Age of what the snapshot says: pipeline, the way here beyond the quickest seen, and waiting since. */
 export function snapshotAge() {

@@ -1,6 +1,7 @@
 // The bar below the page in PLAYBACK: buttons, clock, status. Keys are in keys.js.
 
 import { shown as along } from "./plots/along.js";
+import { shown as people } from "./plots/people.js";
 import { $, mark, slowText, write } from "./words.js";
 import { number } from "./axis.js";
 import { clock, day, wallClock } from "./clock.js";
@@ -58,9 +59,9 @@ function disabled(id, off) {
 export function update() {
   const on = replaying();
   $("transport").hidden = !on;
-  $("trends-tools").hidden = !on;
-  $("regions").hidden = on || along();
-  if (on || !along()) write($("trends-title"), on ? "Session" : "Last 60 s");
+  $("trends-tools").hidden = !on || people();
+  $("regions").hidden = on || along() || people();
+  if (!people() && (on || !along())) write($("trends-title"), on ? "Session" : "Last 60 s");
   $("timeline").setAttribute("role", on ? "slider" : "img");
   const p = player.playback();
   if (!p) return;

@@ -9,12 +9,13 @@ import msgspec
 import numpy as np
 import pytest
 
-from backend.documents.people import people_document
+from backend.documents.people_document import people_document
 from backend.machine.load import load_machine
 from backend.pipeline.config import Config
 from backend.pipeline.people_records import Judged, Missing, People, Seen, Sensor, Tracked
 from backend.safety.partner import Limits
 from backend.safety.people import Risks
+from backend.shell.app.wire import dumps
 from backend.shell.session.people_message import people_message, seen_of
 from backend.shell.session.recorded_people import recorded_people
 from backend.site.site import load_site
@@ -95,12 +96,12 @@ def test_what_was_shown_comes_back() -> None:
         {"left": Judged(np.array([0.5, 3.0]), bodies, risks)},
     )
     document = people_document(people, 100.0)
-    again = recorded_people(json.loads(json.dumps(document)), 100.0, config)
+    again = recorded_people(json.loads(dumps(document)), 100.0, config)
     assert again is not None
     assert people_document(again, 100.0) == document
     assert recorded_people(None, 100.0, config) is None
     unknown = replace(people, reason="no LiDAR data for 0.9 s", age=float("nan"))
-    back = recorded_people(people_document(unknown, 100.0), 100.0, config)
+    back = recorded_people(json.loads(dumps(people_document(unknown, 100.0))), 100.0, config)
     assert back is not None
     assert np.isnan(back.age)
     assert back.reason == unknown.reason

@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from backend.documents.people import PeopleModel
 from backend.shell.app.driving_models import DrivingModel
 
 Vector = list[float]
@@ -84,7 +85,7 @@ class TravelModel(BaseModel):
 
 class EvidenceModel(BaseModel):
     own: str = Field(description="machine:part/number")
-    other: str = Field(description="machine:part/number or a site feature")
+    other: str = Field(description="machine:part/number, a site feature, person:P7 or object:O9")
     distance: Unknown = Field(description="[m]")
     points: list[Vector] | None = Field(description="on own and on other, site frame [m]")
     time_to_contact: Unknown = Field(description="[s]; null when not approaching")
@@ -188,6 +189,7 @@ class SnapshotModel(BaseModel):
     gauge: GaugeStampModel | None = Field(
         None, description="what holds of the working gauge, see /api/gauge"
     )
+    people: PeopleModel | None = Field(None, description="null where the site has no LiDAR")
     images: dict[str, ImageStampModel] = Field(description="newest image by kind and pair")
     health: HealthCountersModel
     backend: BackendModel | None = Field(None, description="of the process that answers")

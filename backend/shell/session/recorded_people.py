@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from backend.documents.people import LEAST_INDEX
 from backend.pipeline.config import Config
 from backend.pipeline.people_records import Judged, Missing, People, Sensor, Tracked
 from backend.safety.people import Risks
@@ -27,7 +28,7 @@ def recorded_people(document: Document | None, now: float, config: Config) -> Pe
     tracks = list(document["tracks"])
     return People(
         str(document["reason"]),
-        float(document["age"]),
+        _number(document["age"], math.nan),
         tuple(
             Sensor(
                 str(one["machine"]),
@@ -87,8 +88,8 @@ def _judged(name: str, risks: list[Document], config: Config) -> Judged:
     own = [one for one in risks if one["machine"] == name]
     bodies = {f"{name}:{body}": k for k, body in enumerate(config.machines[name].body_names)}
     columns = {
-        key: np.array([float(one[key]) for one in own])
-        for key in ("distance", "ttc", "index", "ttc_ahead", "index_ahead")
+        key: np.array([_number(one[key], unknown) for one in own])
+        for key, unknown in _NUMBERS.items()
     }
     nearest = tuple(str(one["body"]) for one in own)
     return Judged(
@@ -104,6 +105,19 @@ def _judged(name: str, risks: list[Document], config: Config) -> Judged:
             np.zeros(len(own), dtype=np.int64),
         ),
     )
+
+
+_NUMBERS = {
+    "distance": math.nan,
+    **dict.fromkeys(("ttc", "index", "ttc_ahead", "index_ahead"), math.inf),
+}
+"""A risk's numbers, and what it means where JSON has none."""
+
+
+def _number(value: Any, unknown: float) -> float:
+    if value is None:
+        return unknown
+    return -math.inf if value == LEAST_INDEX else float(value)
 
 
 def _place(values: Any) -> tuple[float, float, float]:

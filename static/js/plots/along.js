@@ -31,6 +31,10 @@ function track() {
 const newest = () => state.along.get(state.own) ?? null;
 const imageAge = (image) => (image && state.snapshot ? Math.max(0, state.snapshot.time - image.header.state_time) + silence() : Infinity);
 
+export function hide() {
+  on = false;
+}
+
 export function startAlong(give, draw) {
   [send, redraw] = [give, draw];
   $("along-show").addEventListener("click", () => {

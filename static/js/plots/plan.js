@@ -14,6 +14,7 @@ import {
 } from "./plan_layers.js";
 import { drawing, paint as paintDrawing } from "../gauge/drawing.js";
 import { inForce } from "../gauge/model.js";
+import { drawPeople, peopleLines, personSwatch } from "./plan_people.js";
 import { distanceText, drawZones, outlineSun, view as zoneView, zoneExit, zoneLegend, zoneLines, zoneNote } from "./plan_zone.js";
 
 const WIDTHS = [20, 30, 50, 100];
@@ -55,6 +56,7 @@ function paint(g, width, height, dpr) {
     px,
     box,
     view,
+    words: [],
     at: ([e, n]) => [cx + px * (c * (e - view.centre[0]) - s * (n - view.centre[1])), cy - px * (s * (e - view.centre[0]) + c * (n - view.centre[1]))],
     back: (x, y) => {
       const u = (x - cx) / px, v = (cy - y) / px;
@@ -87,6 +89,7 @@ function paint(g, width, height, dpr) {
   const exit = exact ? zoneExit(g, exact, own) : exitArrow(g, own, zone);
   const nearest = nearestLine(g);
   for (const name of names()) base(g, name);
+  const seen = drawPeople(g);
   north(g, turn);
   if (exact) zoneNote(g, exact, stale);
   paintDrawing(g);
@@ -100,11 +103,12 @@ function paint(g, width, height, dpr) {
       : [[swatches.area(hatch(g, stale ? C.stale : C.partner, dpr), stale ? C.stale : C.partner), stale ? staleZone : "zone for ✚ (Sun)"]]),
     [swatches.line(C.text), "reach now"],
     [swatches.line(C.text, [4, 3], 1.5), "max"],
+    ...(seen?.tracks.length ? [[swatches.glyph(personSwatch), "person"]] : []),
   ]);
   return {
     state: {
       own: state.own, partner: state.partner, playback: replaying(), width: view.width, centre: view.centre, up: view.tracksUp ? "tracks" : "north",
-      base: own.position?.slice(0, 2), zone: zone.length, zones, shown: how, zone_stale: stale, exit, nearest, gauge: inForce(), machines: names().filter((name) => machine(name)?.outlines).length,
+      base: own.position?.slice(0, 2), zone: zone.length, zones, shown: how, zone_stale: stale, exit, nearest, people: seen, gauge: inForce(), machines: names().filter((name) => machine(name)?.outlines).length,
     },
     age,
     label: `Plan of ${view.width} m: ${nameOf(state.own)} base at ${own.position_projected ? own.position_projected.slice(0, 2).map((v) => v.toFixed(1)).join(", ") : "unknown"}; nearest distance to ${nameOf(state.partner)} ${nearest === null ? "unknown" : metres(nearest)}${exit ? `; base inside the warning zone by ${metres(exit)}` : ""}${exact ? `; ${distanceText(exact)}` : ""}`,
@@ -116,6 +120,8 @@ function probe(x, y) {
   if (!box || !own || drawing() || x < box.left || x > box.right || y < box.top || y > box.bottom) return null;
   const [e, n] = chart.back(x, y);
   const origin = state.site?.frame?.origin ?? [0, 0, 0];
+  const near = peopleLines(x, y);
+  if (near.length) return near;
   const lines = [`E ${(e + origin[0]).toFixed(1)} m, N ${(n + origin[1]).toFixed(1)} m`];
   const exact = shownZone() === "sun" ? null : zoneImage();
   const zone = exact ? [] : zonePoints(image());

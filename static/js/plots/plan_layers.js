@@ -8,8 +8,14 @@ import { edgeDistance, inside } from "../geometry.js";
 import { isOwnTrack, volumes } from "../gauge/model.js";
 import { atLeast, label as nameOf, machine, pair, partnerLevel, silence, state } from "../state.js";
 
-/** Of the present drawing: at([E, N]) -> [x, y] and back(x, y) -> [E, N]; px per metre; box; view. */
-export const chart = { at: null, back: null, px: 1, box: null, view: null };
+/** Of the present drawing: at([E, N]) -> [x, y] and back(x, y) -> [E, N]; px per metre; box; view; where words stand. */
+export const chart = { at: null, back: null, px: 1, box: null, view: null, words: [] };
+
+/** Keeps the place of a text that was just drawn about (x, y), so that nothing less important covers it. */
+function keep(g, text, x, y, high = size("tick")) {
+  const half = g.measureText(text).width / 2;
+  chart.words.push({ left: x - half, right: x + half, top: y - 0.6 * high, bottom: y + 0.6 * high });
+}
 
 export function zonePoints(entry) {
   const array = entry?.arrays.zone;
@@ -245,6 +251,7 @@ export function nearestLine(g) {
   const mx = Math.min(Math.max((x0 + x1) / 2, chart.box.left + 30), chart.box.right - 30);
   const my = Math.min(Math.max((y0 + y1) / 2 - 12, chart.box.top + 16), chart.box.bottom - 4);
   label(g, metres(distance), mx, my, { align: "center", colour, weight: 700, name: "t3", halo: true });
+  keep(g, metres(distance), mx, my - 0.4 * size("t3"), size("t3"));
   return distance;
 }
 
@@ -258,7 +265,9 @@ export function base(g, name) {
   // Outwards, so that the distance has its place between the two names.
   const other = machine(name === state.own ? state.partner : state.own);
   const out = other?.position && machine(name) !== other ? Math.sign(x - chart.at(other.position)[0]) * 1.2 * size("tick") : 0;
-  label(g, nameOf(name), x + out, above ? y - r : y + r, { align: "center", base: "middle", colour: tint(name), weight: 600, halo: true });
+  const at = { x: x + out, y: above ? y - r : y + r };
+  label(g, nameOf(name), at.x, at.y, { align: "center", base: "middle", colour: tint(name), weight: 600, halo: true });
+  keep(g, nameOf(name), at.x, at.y);
 }
 
 export function north(g, turn) {

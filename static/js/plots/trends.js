@@ -9,6 +9,7 @@ import { label as nameOf, replaying, silence, snapshotAge, state } from "../stat
 import { surface } from "../surface.js";
 import { ageText } from "../head.js";
 import * as along from "./along.js";
+import * as people from "./people.js";
 import * as series from "./series.js";
 
 const SPAN = 60;
@@ -109,6 +110,6 @@ function probe(x, y) {
   return lines;
 }
 
-/** Live the last minute, or the strip along the track; of a recorded session whatever part of it is asked for. */
-const shown = () => (replaying() ? series : along.shown() ? along : { paint, probe });
+/** Live the last minute, people, or the strip along the track; of a recorded session whatever part of it is asked for, or people. */
+const shown = () => (people.shown() ? people : replaying() ? series : along.shown() ? along : { paint, probe });
 export const trends = () => surface($("trends"), (...given) => shown().paint(...given), (x, y) => shown().probe(x, y));
