@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 
 from backend.fusion.fuse import common_time, fuse
 from backend.fusion.inflation import eta
-from backend.fusion.pose import FusedPose
+from backend.fusion.pose import FusedPose, Validity
 from backend.fusion.rig import Rig, make_rig
 from backend.fusion.samples import Sample
 from backend.fusion.streams import Streams, ingest
@@ -169,6 +169,10 @@ def _partner(
     joints = len(config.machines[name].joints)
     if name in unknown:
         return partner.unknown(name, joints, unknown[name], now)
+    own = machines[name]
+    if own.body is None or own.pose.validity is not Validity.VALID:  # alone on its site
+        reason = own.pose.reasons[0] if own.pose.reasons else "is unknown"
+        return partner.unknown(name, joints, f"{config.labels[name]} {reason}", now)
     braking = approach_of(name, machines, now, config) if driven else None
     return partner.judge(name, joints, tuple(close[name]), config.limits, now, braking)
 

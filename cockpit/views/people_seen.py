@@ -1,4 +1,4 @@
-"""The people of a snapshot as the 3D scene shows them: each with the worst that it is to anybody."""
+"""The people of a snapshot as the 3D scene shows them, each at its worst for any machine."""
 
 from __future__ import annotations
 

@@ -281,3 +281,16 @@ def test_braking_is_judged_only_where_somebody_drives(config: Config) -> None:
     ages = [c for c in blind.concerns if c.name == "age"]
     assert [c.machine for c in ages] == ["a"]
     assert all(c.level is Level.UNKNOWN and not c.allowed.any() for c in ages)
+
+
+def test_a_machine_alone_on_its_site_is_unknown_until_it_is_heard(config: Config) -> None:
+    alone = dataclasses.replace(config, machines={"a": config.machines["a"]}, own=("a",))
+    state, snapshot = step(initial(alone), Inputs(driven=("a",)), 100.0, alone)
+    assert [c.level for c in snapshot.concerns if c.name == "partner"] == [Level.UNKNOWN]
+    for k in range(1, 10):
+        now = 100.0 + 0.02 * k
+        heard = dataclasses.replace(inputs(alone, now, silent=("b",)), driven=("a",))
+        state, snapshot = step(state, heard, now, alone)
+    assert [c.level for c in snapshot.concerns if c.name == "partner"] == [Level.CLEAR]
+    _, snapshot = step(state, Inputs(driven=("a",)), 103.0, alone)
+    assert [c.level for c in snapshot.concerns if c.name == "partner"] == [Level.UNKNOWN]
