@@ -34,6 +34,11 @@ def _mount(table: LidarTable, link: int) -> LidarMount:
     )
 
 
+def mount_called(machine: Machine, name: str) -> LidarMount | None:
+    """The machine's LiDAR of that name, as clouds tell it; None when it has none."""
+    return next((mount for mount in machine.lidars if mount.name == name), None)
+
+
 def sensor_pose(machine: Machine, mount: LidarMount, T_site_links: Array) -> Array:
     """T_site_sensor (..., 4, 4). mount: one of machine.lidars; T_site_links: (..., L, 4, 4), the
     machine's link poses. Raises ValueError for the links of another machine.

@@ -91,6 +91,7 @@ def layouts(draw: st.DrawFn) -> dict[str, Any]:
     }
 
 
+@settings(max_examples=50)
 @given(layouts(), st.randoms(use_true_random=False))
 def test_every_layout_is_read(layout: dict[str, Any], dice: random.Random) -> None:
     data = bytearray(dice.randbytes(layout["height"] * layout["row_step"]))

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from backend.errors import InputError
 from backend.machine.kinematics import body_boxes, link_poses
-from backend.machine.lidars import sensor_pose
+from backend.machine.lidars import mount_called, sensor_pose
 from backend.machine.load import load_machine
 from backend.spatial.rotation import from_attitude
 from backend.spatial.transform import make
@@ -59,6 +59,8 @@ def test_mounts_are_as_stated_and_a_vlp_16_by_default(tiny):
     assert (first.name, rear.name) == ("lidar", "rear")
     np.testing.assert_allclose(np.degrees(first.elevations), np.linspace(-15.0, 15.0, 16))
     np.testing.assert_allclose(np.degrees(rear.elevations), [-30.0, 0.0, 5.0])
+    assert mount_called(load(tiny(), TWO), "rear").link == rear.link == 0
+    assert mount_called(load(tiny(), TWO), "front") is None
     assert load(tiny(), "").lidars == ()
 
 

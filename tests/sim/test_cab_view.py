@@ -174,3 +174,26 @@ def test_what_stands_on_the_site_is_seen() -> None:
     own = Seen(MINI, q, np.eye(4))
     wall = box(np.array([8.0, 1.5, 1.0]), np.array([0.2, 1.0, 1.0]))
     assert (cab_view(own, [], Surroundings(wall)) != cab_view(own, [], Surroundings())).any()
+
+
+def test_people_and_vehicles_are_seen_as_boxes_of_their_own() -> None:
+    q = np.radians([0.0, 40.0, -60.0, -60.0])
+    own = Seen(MINI, q, np.eye(4))
+    at = np.array([7.0, 2.0, 0.9])
+    person = box(at, np.array([0.22, 0.22, 0.875]))
+    alone = cab_view(own, [], Surroundings()).astype(int)
+    x, y, z = (inverse(camera_pose(MINI, q, np.eye(4))) @ np.append(at, 1.0))[:3]
+    lens = Lens()
+    u, v = int(lens.width / 2 + lens.focal * x / z), int(lens.height / 2 + lens.focal * y / z)
+    colors = []
+    for around in (
+        Surroundings(people=person),
+        Surroundings(vehicles=person),
+        Surroundings(person),
+    ):
+        picture = cab_view(own, [], around).astype(int)
+        changed = (picture != alone).any(axis=-1)
+        assert changed[v, u]
+        assert 20 < changed.sum() < 3000
+        colors.append(tuple(picture[v, u]))
+    assert len(set(colors)) == 3

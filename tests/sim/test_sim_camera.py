@@ -6,6 +6,7 @@ import io
 import threading
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,7 @@ from backend.shell.link.session import open_session, publisher, with_port
 from backend.shell.sim import camera as module
 from backend.shell.sim.camera import CabCamera
 from backend.shell.sim.dynamics import SimState
+from backend.site.moving import Person
 from backend.site.site import load_site
 
 SITE = load_site("demo")
@@ -126,3 +128,19 @@ def test_pictures_survive_the_wire_and_nothing_else_passes_for_one() -> None:
     for payload in (b"", b"\0\1\0\0junk", encode_clock(1.0), encode_picture(1.0, "x", b"GIF89a")):
         with pytest.raises(DecodeError):
             decode_picture(payload)
+
+
+def test_who_walks_on_the_site_is_in_the_picture_at_that_time(wire: Wire) -> None:
+    ahead = Person(name="ann", path=((308607.0, 4129954.0), (308607.0, 4129944.0)), speed=1.0)
+    pictures = []
+    for people in ((), (ahead,)):
+        camera = CabCamera(
+            *(wire.machine, replace(SITE, people=people), "left", MACHINE, wire.state),
+            *(lambda: False, None, lambda stamp: stamp - wire.stamp + 3.0),
+        )
+        pictures.append(Image.open(io.BytesIO(camera._picture(*wire.state()))))
+        camera.close()
+    changed = (
+        np.abs(np.asarray(pictures[0]).astype(int) - np.asarray(pictures[1])).max(axis=-1) > 40
+    )
+    assert 100 < changed.sum() < 8000
