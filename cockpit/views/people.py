@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import viser
@@ -19,6 +18,7 @@ from backend.tracking.records import Status
 from cockpit.views import palette, people_shapes
 from cockpit.views.labels import Words
 from cockpit.views.lines import Lines, ink
+from cockpit.views.people_records import SeenLost, SeenPeople, SeenTrack
 from cockpit.views.shapes import NO_LINE, Float32, box_mesh
 
 PERIOD = 0.09  # between two drawings, unless a level changed [s]
@@ -34,58 +34,6 @@ INKS = {
     Risk.WARNING: ink(palette.LEVEL[Level.SLOW]),
     Risk.EMERGENCY: ink(palette.LEVEL[Level.STOP]),
 }
-
-
-@dataclass(frozen=True)
-class SeenTrack:
-    """position: (3,) middle of its box, site frame [m]; yaw [rad]; size: (3,) length, width, height
-    [m]; ahead: (2,) in a second [m]; cov: (2, 2) of it [m^2]; risk: the worst for any machine;
-    distance: to the nearest body of the machine that it is worst for [m], NaN when unknown.
-    """
-
-    id: int
-    person: bool
-    status: Status
-    position: Array
-    yaw: float
-    size: Array
-    ahead: Array
-    cov: Array
-    risk: Risk = Risk.SAFE
-    distance: float = math.nan
-
-    @property
-    def code(self) -> str:
-        """As operators read it: P7 is a person, O9 an object."""
-        return f"{'P' if self.person else 'O'}{self.id}"
-
-
-@dataclass(frozen=True)
-class SeenLost:
-    """A track that was given up. position: (3,) where it was last seen [m]; seen: how long ago."""
-
-    id: int
-    position: Array
-    seen: float
-
-
-@dataclass(frozen=True)
-class SeenSensor:
-    """A LiDAR. position: (3,) of its newest scan [m]; age: since then [s], NaN before the first."""
-
-    position: Array
-    age: float
-
-
-@dataclass(frozen=True)
-class SeenPeople:
-    """reason: why people are not known, else empty; age: since the newest scan [s], NaN before."""
-
-    tracks: tuple[SeenTrack, ...]
-    lost: tuple[SeenLost, ...]
-    sensors: tuple[SeenSensor, ...]
-    age: float
-    reason: str = ""
 
 
 class PeopleNodes:

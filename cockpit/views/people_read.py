@@ -10,7 +10,7 @@ import numpy as np
 
 from backend.safety.swing_risk import Risk
 from backend.tracking.records import Status
-from cockpit.views.people import SeenLost, SeenPeople, SeenSensor, SeenTrack
+from cockpit.views.people_records import SeenLost, SeenPeople, SeenSensor, SeenTrack
 
 
 def seen_people(document: Mapping[str, Any] | None) -> SeenPeople | None:

@@ -11,7 +11,8 @@ from cockpit.views.ground import GaugeNodes, Ground, ground_height, light
 from cockpit.views.inputs import SceneSite
 from cockpit.views.machines import MachineNodes
 from cockpit.views.nearest import PairNodes
-from cockpit.views.people import PeopleNodes, SeenPeople
+from cockpit.views.people import PeopleNodes
+from cockpit.views.people_records import SeenPeople
 from cockpit.views.sight_nodes import SightNodes
 
 

@@ -14,15 +14,8 @@ from viewing import counted, handle
 from backend.safety.swing_risk import Risk
 from backend.tracking.records import Status
 from cockpit.views import palette, people_shapes
-from cockpit.views.people import (
-    PeopleNodes,
-    SeenLost,
-    SeenPeople,
-    SeenSensor,
-    SeenTrack,
-    lost_text,
-    track_text,
-)
+from cockpit.views.people import PeopleNodes, lost_text, track_text
+from cockpit.views.people_records import SeenLost, SeenPeople, SeenSensor, SeenTrack
 from cockpit.views.scene import Scene
 
 PERSON = SeenTrack(
