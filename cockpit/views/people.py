@@ -6,7 +6,7 @@ Few nodes hold all of them: lines of one kind are one node, whose points are sen
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 
 import numpy as np
 import viser
@@ -138,17 +138,20 @@ class PeopleNodes:
         self._past = kept
 
     def _say(self, people: SeenPeople, known: bool, now: float) -> None:
-        texts: dict[str, tuple[str, Array, object]] = {}
+        texts: dict[str, tuple[str, Array, Hashable]] = {}
         for track in people.tracks:
             above = track.position + np.array([0.0, 0.0, track.size[2] / 2.0 + 0.2])
-            meaning = (known, track.status, track.risk)
-            texts[f"track/{track.id}"] = (track_text(track, known), above, meaning)
+            texts[f"track/{track.id}"] = (
+                track_text(track, known),
+                above,
+                (known, track.status, track.risk),
+            )
         for one in people.lost:
             above = one.position + np.array([0.0, 0.0, 0.6])
             texts[f"lost/{one.id}"] = (lost_text(one), above, "lost")
         for name in self._words.keys() - texts.keys():
             self._words.pop(name).label.remove()
-        for name, (text, above, meaning) in texts.items():
+        for name, (text, place, meaning) in texts.items():
             if name not in self._words:
                 self._words[name] = Words(
                     self._scene.add_label(
@@ -156,8 +159,8 @@ class PeopleNodes:
                     )
                 )
             words = self._words[name]
-            if np.abs(above - words.label.position).max() > 5e-3:
-                words.label.position = above
+            if np.abs(place - words.label.position).max() > 5e-3:
+                words.label.position = place
             words.show(text, meaning, now)
 
     def _line(self, name: str, pixels: float) -> Lines:

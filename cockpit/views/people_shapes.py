@@ -55,7 +55,7 @@ def foretold(positions: Array, ahead: Array, cov: Array, z: float) -> Float32:
     with 95 %; of no size where the covariance is not known. positions: (n, 3); ahead: (n, 2); cov:
     (n, 2, 2); z: of the ground.
     """
-    known = np.isfinite(cov).all(axis=(1, 2))[:, None, None]
+    known = np.asarray(np.isfinite(cov).all(axis=(1, 2)))[:, None, None]
     values, vectors = np.linalg.eigh(np.where(known, (cov + np.swapaxes(cov, 1, 2)) / 2.0, 0.0))
     root = vectors * np.sqrt(MOST * np.maximum(values, 0.0))[:, None]
     lines = np.full((len(ahead), 1 + len(RING), 2, 3), z, dtype=np.float32)
@@ -81,7 +81,7 @@ def lost_mark(position: Array, z: float) -> Float32:
     """A dashed circle of half a metre with a cross: somebody was last seen here."""
     at = np.array([position[0], position[1], z])
     lines = np.concatenate([0.5 * circle(32, dashed=True), 0.2 * LOST])
-    return (lines + at).astype(np.float32)
+    return np.asarray(lines + at, dtype=np.float32)
 
 
 def sensor_mark(position: Array, size: float = 0.15) -> Float32:
@@ -99,4 +99,4 @@ def tails(ways: Sequence[Array], z: float) -> Float32:
     own = np.repeat(np.arange(len(ways)), [len(way) for way in ways])
     lines = np.full((max(len(flat) - 1, 0), 2, 3), z, dtype=np.float32)
     lines[:, 0, :2], lines[:, 1, :2] = flat[:-1], flat[1:]
-    return lines[own[:-1] == own[1:]]
+    return np.asarray(lines[own[:-1] == own[1:]])

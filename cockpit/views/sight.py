@@ -21,7 +21,7 @@ DIRECTIONS, RINGS = 120, 11
 
 def directions(azimuth: float) -> Array:
     """(DIRECTIONS,) all around [rad], the first straight ahead."""
-    return azimuth + np.arange(DIRECTIONS) * (2.0 * np.pi / DIRECTIONS)
+    return azimuth + np.arange(DIRECTIONS, dtype=np.float64) * (2.0 * np.pi / DIRECTIONS)
 
 
 def edges() -> Array:
