@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 import viser
 
+from backend.spatial.types import AnyArray
 from cockpit.views import palette
 from cockpit.views.shapes import NO_LINE, Float32
 
@@ -24,17 +23,21 @@ class Lines:
             visible=False,
         )
 
-    def draw(self, parts: Sequence[Float32], colors: Sequence[palette.Rgb]) -> None:
-        """parts: lines (k, 2, 3) that have one colour each; none hides the node."""
-        points = np.concatenate([NO_LINE[:0], *parts])
+    def draw(self, points: Float32, colors: AnyArray) -> None:
+        """points: (k, 2, 3), none hides the node; colors: (3,) or (k, 3) uint8, see `ink`."""
         if not len(points):
             if self.node.visible:
                 self.node.visible = False
             return
-        inks = np.concatenate([palette.each(c, p) for c, p in zip(colors, parts, strict=True)])
         if not np.array_equal(points, self.node.points):
             self.node.points = points
+        inks = np.broadcast_to(colors.reshape(-1, 1, 3), points.shape)
         if not np.array_equal(inks, self.node.colors):
             self.node.colors = inks
         if not self.node.visible:
             self.node.visible = True
+
+
+def ink(color: palette.Rgb) -> AnyArray:
+    """(3,) uint8: what to send for lines that shall show in `color`."""
+    return np.array(palette.line(color), dtype=np.uint8)

@@ -6,83 +6,34 @@ Few nodes hold all of them: lines of one kind are one node, whose points are sen
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Hashable, Sequence
 
 import numpy as np
 import viser
 
 from backend.safety.record import Level
 from backend.safety.swing_risk import Risk
-from backend.spatial.types import Array
+from backend.spatial.types import AnyArray, Array
 from backend.tracking.records import Status
 from cockpit.views import palette, people_shapes
 from cockpit.views.labels import Words
-from cockpit.views.lines import Lines
-from cockpit.views.shapes import box_mesh
+from cockpit.views.lines import Lines, ink
+from cockpit.views.people_records import SeenLost, SeenPeople, SeenTrack
+from cockpit.views.shapes import NO_LINE, Float32, box_mesh
 
 PERIOD = 0.09  # between two drawings, unless a level changed [s]
 OLD = 0.5  # age of the newest scan from which nobody counts as seen [s]
 TAIL = 3.0  # [s]
 JUMP = 3.0  # between two drawings: another time of a recording, not a way that was walked [m]
 RAISED = 0.02  # over the ground, so that lines are not in it [m]
-COLOR: dict[Risk, palette.Rgb] = {
-    Risk.SAFE: palette.PEOPLE,
-    Risk.WARNING: palette.LEVEL[Level.SLOW],
-    Risk.EMERGENCY: palette.LEVEL[Level.STOP],
+WHITE, TEXT, DIM, STALE = (
+    ink(c) for c in (palette.PEOPLE, palette.TEXT, palette.SECONDARY, palette.STALE)
+)
+INKS = {
+    Risk.SAFE: WHITE,
+    Risk.WARNING: ink(palette.LEVEL[Level.SLOW]),
+    Risk.EMERGENCY: ink(palette.LEVEL[Level.STOP]),
 }
-
-
-@dataclass(frozen=True)
-class SeenTrack:
-    """position: (3,) middle of its box, site frame [m]; yaw [rad]; size: (3,) length, width, height
-    [m]; ahead: (2,) in a second [m]; cov: (2, 2) of it [m^2]; risk: the worst for any machine;
-    distance: to the nearest body of the machine that it is worst for [m], NaN when unknown.
-    """
-
-    id: int
-    person: bool
-    status: Status
-    position: Array
-    yaw: float
-    size: Array
-    ahead: Array
-    cov: Array
-    risk: Risk = Risk.SAFE
-    distance: float = math.nan
-
-    @property
-    def code(self) -> str:
-        """As operators read it: P7 is a person, O9 an object."""
-        return f"{'P' if self.person else 'O'}{self.id}"
-
-
-@dataclass(frozen=True)
-class SeenLost:
-    """A track that was given up. position: (3,) where it was last seen [m]; seen: how long ago."""
-
-    id: int
-    position: Array
-    seen: float
-
-
-@dataclass(frozen=True)
-class SeenSensor:
-    """A LiDAR. position: (3,) of its newest scan [m]; age: since then [s], NaN before the first."""
-
-    position: Array
-    age: float
-
-
-@dataclass(frozen=True)
-class SeenPeople:
-    """reason: why people are not known, else empty; age: since the newest scan [s], NaN before."""
-
-    tracks: tuple[SeenTrack, ...]
-    lost: tuple[SeenLost, ...]
-    sensors: tuple[SeenSensor, ...]
-    age: float
-    reason: str = ""
 
 
 class PeopleNodes:
@@ -115,44 +66,49 @@ class PeopleNodes:
             self._remember(people.tracks, time)
         self._draw_tracks(people.tracks, known, ground + RAISED, time)
         marks = [people_shapes.lost_mark(one.position, ground + RAISED) for one in people.lost]
-        self._line("lost", 2.0).draw(marks, [palette.PEOPLE] * len(marks))
+        self._line("lost", 2.0).draw(_joined(marks), WHITE)
         shapes = [people_shapes.sensor_mark(one.position) for one in people.sensors]
-        fresh = [one.age + lost <= OLD for one in people.sensors]
-        self._line("sensors", 1.6).draw(shapes, [_ink(palette.TEXT, new) for new in fresh])
+        fresh = [TEXT if one.age + lost <= OLD else STALE for one in people.sensors]
+        self._line("sensors", 1.6).draw(_joined(shapes), _each(fresh, [len(s) for s in shapes]))
         self._say(people, known, now)
 
     def _draw_tracks(self, tracks: Sequence[SeenTrack], known: bool, z: float, time: float) -> None:
-        inks = [_ink(COLOR[t.risk], known) for t in tracks]
-        boxes = [people_shapes.box_lines(t.position, t.yaw, t.size, t.status) for t in tracks]
-        self._line("boxes", 2.4).draw(boxes, inks)
+        boxes, inks = [], []
+        for status in Status:
+            some = [t for t in tracks if t.status is status]
+            if some:
+                lines = people_shapes.box_lines(*_placed(some), status)
+                boxes.append(lines.reshape(-1, 2, 3))
+                own = [INKS[t.risk] if known else STALE for t in some]
+                inks.append(_each(own, [lines.shape[1]] * len(some)))
+        self._line("boxes", 2.4).draw(_joined(boxes), _joined_inks(inks))
         sure = [t for t in tracks if t.status is not Status.TENTATIVE] if known else []
         self._fill_boxes([t for t in sure if t.status is Status.CONFIRMED])
-        white = [palette.PEOPLE] * len(tracks)
-        ways = [people_shapes.foretold(t.position, t.ahead, t.cov, z) for t in sure]
-        self._line("ahead", 1.4).draw(ways, white[: len(ways)])
+        ways = people_shapes.foretold(
+            np.array([t.position for t in sure]).reshape(-1, 3),
+            np.array([t.ahead for t in sure]).reshape(-1, 2),
+            np.array([t.cov for t in sure]).reshape(-1, 2, 2),
+            z,
+        )
+        self._line("ahead", 1.4).draw(ways.reshape(-1, 2, 3), WHITE)
         shown = tracks if known else ()
-        recent = {
-            t.id: [p for at, p in self._past.get(t.id, []) if at >= time - TAIL] for t in shown
-        }
-        tails = [people_shapes.tail(np.array(recent[t.id]), z) for t in shown]
-        self._line("tails", 1.8).draw(tails, [palette.SECONDARY] * len(tails))
+        recent = [[p for at, p in self._past.get(t.id, []) if at >= time - TAIL] for t in shown]
+        walked = [np.array(way) for way in recent if len(way) > 1]
+        self._line("tails", 1.8).draw(people_shapes.tails(walked, z), DIM)
+        risky = [t for t in shown if t.risk is not Risk.SAFE]
         marks = [
             people_shapes.level_mark(t.position, max(0.6, float(t.size[:2].max())), t.risk, z)
-            for t in shown
+            for t in risky
         ]
-        self._line("levels", 3.5).draw(marks, inks)
+        colors = _each([INKS[t.risk] for t in risky], [len(mark) for mark in marks])
+        self._line("levels", 3.5).draw(_joined(marks), colors)
 
     def _fill_boxes(self, tracks: Sequence[SeenTrack]) -> None:
         if not tracks:
             if self._fill is not None:
                 self._fill.visible = False
             return
-        boxes = people_shapes.upright(
-            np.array([t.position for t in tracks]),
-            np.array([t.yaw for t in tracks]),
-            np.array([t.size for t in tracks]),
-        )
-        vertices, faces = box_mesh(boxes)
+        vertices, faces = box_mesh(people_shapes.upright(*_placed(tracks)))
         if self._fill is None:
             self._fill = self._scene.add_mesh_simple(
                 "/people/fill",
@@ -182,17 +138,20 @@ class PeopleNodes:
         self._past = kept
 
     def _say(self, people: SeenPeople, known: bool, now: float) -> None:
-        texts: dict[str, tuple[str, Array, object]] = {}
+        texts: dict[str, tuple[str, Array, Hashable]] = {}
         for track in people.tracks:
             above = track.position + np.array([0.0, 0.0, track.size[2] / 2.0 + 0.2])
-            meaning = (known, track.status, track.risk)
-            texts[f"track/{track.id}"] = (track_text(track, known), above, meaning)
+            texts[f"track/{track.id}"] = (
+                track_text(track, known),
+                above,
+                (known, track.status, track.risk),
+            )
         for one in people.lost:
             above = one.position + np.array([0.0, 0.0, 0.6])
             texts[f"lost/{one.id}"] = (lost_text(one), above, "lost")
         for name in self._words.keys() - texts.keys():
             self._words.pop(name).label.remove()
-        for name, (text, above, meaning) in texts.items():
+        for name, (text, place, meaning) in texts.items():
             if name not in self._words:
                 self._words[name] = Words(
                     self._scene.add_label(
@@ -200,8 +159,8 @@ class PeopleNodes:
                     )
                 )
             words = self._words[name]
-            if np.abs(above - words.label.position).max() > 5e-3:
-                words.label.position = above
+            if np.abs(place - words.label.position).max() > 5e-3:
+                words.label.position = place
             words.show(text, meaning, now)
 
     def _line(self, name: str, pixels: float) -> Lines:
@@ -238,5 +197,23 @@ def lost_text(one: SeenLost) -> str:
     return f"P{one.id} last seen here, {one.seen:.0f} s ago"
 
 
-def _ink(color: palette.Rgb, known: bool) -> palette.Rgb:
-    return color if known else palette.STALE
+def _placed(tracks: Sequence[SeenTrack]) -> tuple[Array, Array, Array]:
+    """Positions (n, 3), yaws (n,) and sizes (n, 3)."""
+    return (
+        np.array([t.position for t in tracks]),
+        np.array([t.yaw for t in tracks]),
+        np.array([t.size for t in tracks]),
+    )
+
+
+def _joined(parts: Sequence[Float32]) -> Float32:
+    return np.concatenate([NO_LINE[:0], *parts])
+
+
+def _joined_inks(parts: Sequence[AnyArray]) -> AnyArray:
+    return np.concatenate([np.zeros((0, 3), dtype=np.uint8), *parts])
+
+
+def _each(inks: Sequence[AnyArray], counts: Sequence[int]) -> AnyArray:
+    """(k, 3): each colour as often as it has lines."""
+    return np.repeat(np.array(inks, dtype=np.uint8).reshape(-1, 3), counts, axis=0)

@@ -9,7 +9,7 @@ import numpy as np
 from backend.pipeline.people_records import PERSON, People
 from backend.safety.swing_risk import Risk
 from backend.tracking.records import Status
-from cockpit.views.people import SeenLost, SeenPeople, SeenSensor, SeenTrack
+from cockpit.views.people_records import SeenLost, SeenPeople, SeenSensor, SeenTrack
 
 
 def seen_people(people: People | None, now: float) -> SeenPeople | None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from backend.safety.swing_risk import Risk
@@ -23,37 +25,44 @@ CORNERS = {Risk.WARNING: 3, Risk.EMERGENCY: 8}
 LOST = np.array([[[-1, 0, 0], [1, 0, 0]], [[0, -1, 0], [0, 1, 0]]], dtype=np.float32)
 
 
-def box_lines(position: Array, yaw: float, size: Array, status: Status) -> Float32:
-    """Edges (k, 2, 3) of an upright box. position: (3,) its middle; size: length, width, height."""
-    c, s = np.cos(yaw), np.sin(yaw)
-    R = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-    ends = ((BOX_EDGES - 0.5) * size) @ R.T + position
-    shares = STROKES[status]
-    start, way = ends[:, None, :1], ends[:, None, 1:] - ends[:, None, :1]
-    return (start + shares[None, :, :, None] * way).reshape(-1, 2, 3).astype(np.float32)
+def turned(yaws: Array) -> Array:
+    """(n, 3, 3) rotations about the vertical. yaws: (n,) [rad]."""
+    c, s = np.cos(yaws), np.sin(yaws)
+    R = np.zeros((len(yaws), 3, 3))
+    R[:, 0, 0], R[:, 0, 1], R[:, 1, 0], R[:, 1, 1], R[:, 2, 2] = c, -s, s, c, 1.0
+    return R
+
+
+def box_lines(positions: Array, yaws: Array, sizes: Array, status: Status) -> Float32:
+    """Edges (n, k, 2, 3) of n upright boxes. positions: (n, 3) of their middles; sizes: (n, 3)
+    length, width, height.
+    """
+    local = (BOX_EDGES - 0.5).reshape(1, -1, 3) * sizes[:, None]
+    ends = local @ np.swapaxes(turned(yaws), 1, 2) + positions[:, None]
+    start, end = np.moveaxis(ends.reshape(len(ends), -1, 2, 3), 2, 0)
+    shares = STROKES[status][None, None, :, :, None]
+    lines = start[:, :, None, None] + shares * (end - start)[:, :, None, None]
+    return np.asarray(lines, dtype=np.float32).reshape(len(ends), -1, 2, 3)
 
 
 def upright(positions: Array, yaws: Array, sizes: Array) -> Boxes:
     """n upright boxes. positions, sizes: (n, 3); yaws: (n,) [rad]."""
-    c, s = np.cos(yaws), np.sin(yaws)
-    R = np.zeros((len(yaws), 3, 3))
-    R[:, 0, 0], R[:, 0, 1], R[:, 1, 0], R[:, 1, 1], R[:, 2, 2] = c, -s, s, c, 1.0
-    return Boxes(positions, R, np.maximum(sizes, 0.0) / 2.0)
+    return Boxes(positions, turned(yaws), np.maximum(sizes, 0.0) / 2.0)
 
 
-def foretold(position: Array, ahead: Array, cov: Array, z: float) -> Float32:
-    """The way (1, 2, 3) to the place in a second and around it the ellipse that holds it with 95 %;
-    the way alone where the covariance is not known. ahead: (2,); cov: (2, 2); z: of the ground.
+def foretold(positions: Array, ahead: Array, cov: Array, z: float) -> Float32:
+    """Ways (n, 33, 2, 3) to the places in a second and around these the ellipses that hold them
+    with 95 %; of no size where the covariance is not known. positions: (n, 3); ahead: (n, 2); cov:
+    (n, 2, 2); z: of the ground.
     """
-    way = np.array([[*position[:2], z], [*ahead, z]], dtype=np.float32)[None]
-    if not np.isfinite(cov).all():
-        return way
-    values, vectors = np.linalg.eigh((cov + cov.T) / 2.0)
-    root = vectors * np.sqrt(MOST * np.maximum(values, 0.0))
-    ring = RING.astype(float)
-    ring[..., :2] = RING[..., :2] @ root.T + ahead
-    ring[..., 2] = z
-    return np.concatenate([way, ring.astype(np.float32)])
+    known = np.asarray(np.isfinite(cov).all(axis=(1, 2)))[:, None, None]
+    values, vectors = np.linalg.eigh(np.where(known, (cov + np.swapaxes(cov, 1, 2)) / 2.0, 0.0))
+    root = vectors * np.sqrt(MOST * np.maximum(values, 0.0))[:, None]
+    lines = np.full((len(ahead), 1 + len(RING), 2, 3), z, dtype=np.float32)
+    lines[:, 0, 0, :2], lines[:, 0, 1, :2] = positions[:, :2], ahead
+    ring = RING[..., :2].reshape(1, -1, 2) @ np.swapaxes(root, 1, 2) + ahead[:, None]
+    lines[:, 1:, :, :2] = ring.reshape(len(ahead), len(RING), 2, 2)
+    return lines
 
 
 def level_mark(position: Array, radius: float, risk: Risk, z: float) -> Float32:
@@ -72,7 +81,7 @@ def lost_mark(position: Array, z: float) -> Float32:
     """A dashed circle of half a metre with a cross: somebody was last seen here."""
     at = np.array([position[0], position[1], z])
     lines = np.concatenate([0.5 * circle(32, dashed=True), 0.2 * LOST])
-    return (lines + at).astype(np.float32)
+    return np.asarray(lines + at, dtype=np.float32)
 
 
 def sensor_mark(position: Array, size: float = 0.15) -> Float32:
@@ -82,6 +91,12 @@ def sensor_mark(position: Array, size: float = 0.15) -> Float32:
     return np.array([[tips[a], tips[b]] for a, b in pairs], dtype=np.float32)
 
 
-def tail(points: Array, z: float) -> Float32:
-    """Lines (k, 2, 3) on the ground through where somebody was. points: (n, 2)."""
-    return polyline(points, False, z) if len(points) > 1 else NO_LINE[:0]
+def tails(ways: Sequence[Array], z: float) -> Float32:
+    """Lines (k, 2, 3) on the ground through where each was. ways: of points (n, 2)."""
+    if not ways:
+        return NO_LINE[:0]
+    flat = np.concatenate(ways)
+    own = np.repeat(np.arange(len(ways)), [len(way) for way in ways])
+    lines = np.full((max(len(flat) - 1, 0), 2, 3), z, dtype=np.float32)
+    lines[:, 0, :2], lines[:, 1, :2] = flat[:-1], flat[1:]
+    return np.asarray(lines[own[:-1] == own[1:]])

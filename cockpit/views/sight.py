@@ -16,12 +16,12 @@ NEAR = 1.0  # from the eye, where the fan begins [m]
 HEIGHT = 1.5
 """Above the ground, at which somebody must be seen (ISO 5006, near the machine) [m]."""
 AROUND = 0.1  # what is nearer to the eye is the cab, through whose windows is looked [m]
-DIRECTIONS, RINGS = 120, 22
+DIRECTIONS, RINGS = 120, 11
 
 
 def directions(azimuth: float) -> Array:
     """(DIRECTIONS,) all around [rad], the first straight ahead."""
-    return azimuth + np.arange(DIRECTIONS) * (2.0 * np.pi / DIRECTIONS)
+    return azimuth + np.arange(DIRECTIONS, dtype=np.float64) * (2.0 * np.pi / DIRECTIONS)
 
 
 def edges() -> Array:
@@ -37,11 +37,14 @@ def hidden(eye: Array, azimuth: float, boxes: Boxes, ground: float) -> BoolArray
     """
     angles, bounds = directions(azimuth), edges()
     middle = (bounds[:-1] + bounds[1:]) / 2.0
-    flat = np.stack([np.cos(angles), np.sin(angles)], axis=1)[:, None, :] * middle[:, None]
+    ahead = np.abs((angles - azimuth + np.pi) % (2.0 * np.pi) - np.pi) <= SIDE + 1e-9
+    ways = np.stack([np.cos(angles[ahead]), np.sin(angles[ahead])], axis=1)
+    flat = ways[:, None, :] * middle[:, None]
     rise = np.full((*flat.shape[:2], 1), ground + HEIGHT - eye[2])
     rays = np.concatenate([flat, rise], axis=2).reshape(-1, 3)
-    away = np.abs((angles - azimuth + np.pi) % (2.0 * np.pi) - np.pi) > SIDE + 1e-9
-    return np.asarray(blocked(eye, rays, boxes).reshape(DIRECTIONS, RINGS) | away[:, None])
+    unseen = np.ones((DIRECTIONS, RINGS), dtype=bool)
+    unseen[ahead] = blocked(eye, rays, boxes).reshape(-1, RINGS)
+    return unseen
 
 
 def blocked(eye: Array, rays: Array, boxes: Boxes) -> BoolArray:
@@ -51,13 +54,12 @@ def blocked(eye: Array, rays: Array, boxes: Boxes) -> BoolArray:
     local = np.einsum("nij,ni->nj", boxes.rotations, eye - boxes.centers)
     outside = (np.abs(local) > boxes.half_extents + AROUND).any(axis=1)
     local, half = local[outside], boxes.half_extents[outside]
-    along = np.einsum("nij,ki->knj", boxes.rotations[outside], rays)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        inverse = 1.0 / np.where(along == 0.0, 1e-12, along)
-    one, other = (-half - local) * inverse, (half - local) * inverse
-    enter = np.minimum(one, other).max(axis=2)
-    leave = np.maximum(one, other).min(axis=2)
-    return np.asarray(((enter <= leave) & (leave >= 0.0) & (enter <= 1.0)).any(axis=1))
+    along = rays @ boxes.rotations[outside]  # (n, k, 3) in the boxes' axes
+    inverse = 1.0 / np.where(along == 0.0, 1e-12, along)
+    middle, apart = -local[:, None] * inverse, half[:, None] * np.abs(inverse)
+    enter = (middle - apart).max(axis=2)
+    leave = (middle + apart).min(axis=2)
+    return np.asarray(((enter <= leave) & (leave >= 0.0) & (enter <= 1.0)).any(axis=0))
 
 
 def fan(eye: Array, azimuth: float, unseen: BoolArray) -> Float32:

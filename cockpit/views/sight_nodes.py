@@ -11,10 +11,12 @@ from backend.pipeline.records import Body3D, MachineState
 from backend.spatial.types import Array
 from cockpit.views import palette, sight
 from cockpit.views.inputs import SceneMachine
-from cockpit.views.lines import Lines
+from cockpit.views.lines import Lines, ink
+from cockpit.views.shapes import NO_LINE
 
-PERIOD = 0.2  # between two drawings of one machine [s]
-STILL = 0.01  # change of its bodies' places that is worth drawing anew [m]
+PERIOD = 0.4  # between two drawings of one machine [s]
+STILL = 0.03  # change of its bodies' places that is worth drawing anew [m]
+BLIND, EYES = ink(palette.BLIND), ink(palette.EYES)
 
 
 class SightNodes:
@@ -35,7 +37,7 @@ class SightNodes:
             body = state.body if state is not None and shown else None
             if body is None:
                 for lines in self._nodes.get(name, ()):
-                    lines.draw([], [])
+                    lines.draw(NO_LINE[:0], BLIND)
                 self._drawn.pop(name, None)
                 continue
             before = self._drawn.get(name)
@@ -55,9 +57,9 @@ class SightNodes:
         unseen = sight.hidden(eye, body.azimuth, body.boxes, ground)
         blind, field = self._nodes[name]
         up = np.array([0.0, 0.0, ground + 0.012], dtype=np.float32)
-        field.draw([sight.frame(eye, body.azimuth, unseen) + up], [palette.EYES])
+        field.draw(sight.frame(eye, body.azimuth, unseen) + up, EYES)
         unseen[1::2] = False  # every second line says as much, and more quietly
-        blind.draw([sight.fan(eye, body.azimuth, unseen) + up], [palette.BLIND])
+        blind.draw(sight.fan(eye, body.azimuth, unseen) + up, BLIND)
 
 
 def _worth(before: tuple[float, float, Array], body: Body3D, ground: float, now: float) -> bool:

@@ -5,6 +5,7 @@ import { metres, seconds } from "./axis.js";
 import { alarms, atLeast, label, link, machine, notices, pair, replaying, severity, silence, snapshotAge, state, wall } from "./state.js";
 import { levelShape } from "./glyphs.js";
 import { wallClock } from "./clock.js";
+import { unknown as peopleUnknown } from "./people/model.js";
 import { acknowledge, acknowledged, sound } from "./sound.js";
 import { ageLevel, ageText } from "./head.js";
 import * as history from "./alarm_history.js";
@@ -43,6 +44,9 @@ function judge() {
     const why = p?.reason || machine(invalid)?.reasons?.[0] || "no complete pose";
     return { level: "UNKNOWN", line: `UNKNOWN · ${label(state.own)} ↔ ${label(state.partner)}`, detail: `Clearance unknown: ${why}.`, key: "unknown" };
   }
+  // Whoever does not know where people are must not say that all is clear.
+  const blind = peopleUnknown();
+  if (blind) return { level: "UNKNOWN", line: `UNKNOWN · people near ${label(state.own)}`, detail: `Where people are is not known: ${blind}.`, key: "people unknown" };
   if (!p) return { level: "CLEAR", line: `CLEAR · ${label(state.own)} · no other machine`, detail: "", key: "alone" };
   if (p.distance === null) {
     return { level: "CLEAR", line: `CLEAR · ${label(p.a)} ↔ ${label(p.b)} · over ${metres(calmDistance(p.at_least))}`, detail: "", key: "far" };

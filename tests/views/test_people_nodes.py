@@ -14,15 +14,8 @@ from viewing import counted, handle
 from backend.safety.swing_risk import Risk
 from backend.tracking.records import Status
 from cockpit.views import palette, people_shapes
-from cockpit.views.people import (
-    PeopleNodes,
-    SeenLost,
-    SeenPeople,
-    SeenSensor,
-    SeenTrack,
-    lost_text,
-    track_text,
-)
+from cockpit.views.people import PeopleNodes, lost_text, track_text
+from cockpit.views.people_records import SeenLost, SeenPeople, SeenSensor, SeenTrack
 from cockpit.views.scene import Scene
 
 PERSON = SeenTrack(
@@ -38,6 +31,19 @@ def people(*tracks: SeenTrack, **more: object) -> SeenPeople:
     return SeenPeople(tracks, **given)
 
 
+def boxed(status: Status) -> np.ndarray:
+    """Lines (k, 2, 3) of PERSON's box, the second of two."""
+    positions = np.array([[0.0, 0.0, 0.0], PERSON.position])
+    sizes = np.array([[1.0, 1.0, 1.0], PERSON.size])
+    return people_shapes.box_lines(positions, np.array([0.0, 0.4]), sizes, status)[1]
+
+
+def ways(cov: np.ndarray, z: float) -> np.ndarray:
+    """Lines (k, 2, 3) of PERSON's foretold place, the second of two."""
+    ahead, two = np.array([[9.0, 9.0], PERSON.ahead]), np.array([PERSON.position, PERSON.position])
+    return people_shapes.foretold(two, ahead, np.array([np.eye(2), cov]), z)[1]
+
+
 def names(server: viser.ViserServer) -> set[str]:
     """Of what is drawn; a frame that only holds others has no handle worth counting."""
     known = server.scene._handle_from_node_name
@@ -47,7 +53,7 @@ def names(server: viser.ViserServer) -> set[str]:
 
 
 def test_a_box_stands_upright_where_the_track_is() -> None:
-    lines = people_shapes.box_lines(PERSON.position, 0.4, PERSON.size, Status.CONFIRMED)
+    lines = boxed(Status.CONFIRMED)
     corners = np.unique(lines.reshape(-1, 3).round(4), axis=0)
     assert len(corners) == 8
     np.testing.assert_allclose(corners.mean(axis=0), PERSON.position, atol=1e-3)
@@ -61,13 +67,13 @@ def test_a_box_stands_upright_where_the_track_is() -> None:
 
 @pytest.mark.parametrize(("status", "share"), [(Status.COASTING, 0.6), (Status.TENTATIVE, 0.4)])
 def test_who_is_not_sure_is_drawn_in_parts(status: Status, share: float) -> None:
-    lines = people_shapes.box_lines(PERSON.position, 0.4, PERSON.size, status)
+    lines = boxed(status)
     length = np.linalg.norm(lines[:, 1] - lines[:, 0], axis=1).sum()
     assert length == pytest.approx(share * 4 * (0.5 + 0.6 + 1.8), rel=1e-4)
 
 
 def test_the_ring_holds_ninety_five_of_a_hundred_places() -> None:
-    lines = people_shapes.foretold(PERSON.position, PERSON.ahead, PERSON.cov, 0.02)
+    lines = ways(PERSON.cov, 0.02)
     np.testing.assert_allclose(lines[0], [[3.0, 1.0, 0.02], [1.8, 1.2, 0.02]], atol=1e-6)
     offset = lines[1:, 0, :2] - PERSON.ahead
     squared = np.einsum("ki,ij,kj->k", offset, np.linalg.inv(PERSON.cov), offset)
@@ -76,8 +82,8 @@ def test_the_ring_holds_ninety_five_of_a_hundred_places() -> None:
     drawn = rng.multivariate_normal(PERSON.ahead, PERSON.cov, 20_000) - PERSON.ahead
     inside = np.einsum("ki,ij,kj->k", drawn, np.linalg.inv(PERSON.cov), drawn) < squared.mean()
     assert inside.mean() == pytest.approx(0.95, abs=0.006)
-    vague = people_shapes.foretold(PERSON.position, PERSON.ahead, np.full((2, 2), np.nan), 0.0)
-    assert len(vague) == 1
+    vague = ways(np.full((2, 2), np.nan), 0.0)[1:, :, :2]
+    np.testing.assert_allclose(vague, np.broadcast_to(PERSON.ahead, vague.shape), atol=1e-6)
 
 
 def test_levels_differ_in_shape_and_colour(server: viser.ViserServer) -> None:

@@ -1,11 +1,11 @@
 // People over time and on the TTC–x plane (Rasul 2021, Figs. 12 and 14), for the chosen own machine.
 
-import { C, hatch, rgba, size } from "../theme.js";
+import { C, font, hatch, rgba, size } from "../theme.js";
 import { grouped, number, ticks } from "../axis.js";
 import { clear, fit, label, legend, message, segment, swatches } from "../pen.js";
 import { curve, frame, unknownBox } from "./chart.js";
 import { hide as hideAlong } from "./along.js";
-import { COLOUR, mark, riskLine, times } from "./plan_people.js";
+import { COLOUR, ORDER, mark, overlap, riskLine, times } from "./plan_people.js";
 import { $, write } from "../words.js";
 import { label as nameOf, machine, state } from "../state.js";
 import { ageText } from "../head.js";
@@ -127,17 +127,24 @@ function plane(g, place, dpr) {
   for (const { now, later } of spots) segment(g, ...now, ...later, rgba(C.people, 0.55), 1.2, [4, 3]);
   for (const { later } of spots) times(g, ...later, 4.5);
   for (const { now } of spots) ring(g, ...now);
-  // Marks in one place, above all in the far corner, share a label.
+  // Marks in one place, above all in the far corner, share a label; in a crowd the worst keep theirs.
+  spots.sort((a, b) => ORDER.indexOf(a.risk.level) - ORDER.indexOf(b.risk.level) || a.risk.ttc_ahead - b.risk.ttc_ahead || 0);
   const groups = [];
   for (const spot of spots) {
     const near = groups.find(({ place: p }) => Math.hypot(p[0] - spot.now[0], p[1] - spot.now[1]) < SAME);
     if (near) near.spots.push(spot);
     else groups.push({ place: spot.now, spots: [spot] });
   }
+  const taken = [];
   for (const { place: [px, py], spots: list } of groups) {
     const right = px > (box.left + box.right) / 2;
     const text = list.length > 3 ? `${list.slice(0, 2).map((s) => code(s.track)).join(" ")} +${list.length - 2}` : list.map((s) => code(s.track)).join(" ");
-    label(g, text, right ? px - 9 : px + 9, clamp(py, box.top + 0.6 * t, box.bottom - 0.6 * t), { align: right ? "right" : "left", base: "middle", halo: true, weight: 700, colour: C.text });
+    g.font = font("tick", 700);
+    const w = g.measureText(text).width, left = right ? px - 9 - w : px + 9, middle = clamp(py, box.top + 0.6 * t, box.bottom - 0.6 * t);
+    const place = { left, right: left + w, top: middle - 0.5 * t, bottom: middle + 0.5 * t };
+    if (taken.some((other) => overlap(place, other))) continue;
+    taken.push(place);
+    label(g, text, right ? px - 9 : px + 9, middle, { align: right ? "right" : "left", base: "middle", halo: true, weight: 700, colour: C.text });
   }
   charts.push({ ...chart, kind: "plane", spots });
   return spots.map(({ track, risk: r }) => ({ code: code(track), level: r.level, ttc: r.ttc, index: r.index, ttc_ahead: r.ttc_ahead, index_ahead: r.index_ahead, now: region(r.ttc, r.index), later: region(r.ttc_ahead, r.index_ahead) }));

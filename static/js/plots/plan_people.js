@@ -12,7 +12,7 @@ const TAIL = 3; // s
 const NEAR = 12; // of the pointer to a mark [px]
 export const COLOUR = { SAFE: C.people, WARNING: C.slow, EMERGENCY: C.stopLine };
 
-const ORDER = ["EMERGENCY", "WARNING", "SAFE"];
+export const ORDER = ["EMERGENCY", "WARNING", "SAFE"];
 
 const radius = () => 0.36 * size("tick");
 
@@ -104,10 +104,10 @@ function tick(g, track, x, y, colour) {
   for (const [width, style] of [[5, C.halo], [2.2, colour]]) segment(g, x, y, ...end, style, width);
 }
 
-const overlap = (a, b) => a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom;
+export const overlap = (a, b) => a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom;
 const around = (x, y, gap) => ({ left: x - gap, right: x + gap, top: y - gap, bottom: y + gap });
 
-/** A label at a mark, where nothing that is in `taken` yet is covered: to the right, to the left, above or below. */
+/** The place of a label at a mark that covers least of what is in `taken` yet: to the right, to the left, above or below. Returns what draws it. */
 function beside(g, text, x, y, gap, taken, options) {
   const t = size("tick"), { box } = chart;
   g.font = font("tick", options.weight);
@@ -118,7 +118,7 @@ function beside(g, text, x, y, gap, taken, options) {
   const covered = (p) => taken.filter((other) => overlap(p, other)).length;
   const place = [...inBox].sort((a, b) => covered(a) - covered(b))[0] ?? places[2];
   taken.push(place);
-  label(g, text, place.left, place.at, { base: "middle", halo: true, ...options });
+  return () => label(g, text, place.left, place.at, { base: "middle", halo: true, ...options });
 }
 
 const ago = ({ seen }) => `last seen ${number(seen, seen < 9.95 ? 1 : 0)} s ago`;
@@ -153,10 +153,13 @@ export function drawPeople(g) {
   for (const one of lost()) gone(g, one);
   const marks = tracks().map((track) => {
     const what = level(track.id), [x, y] = chart.at(track.position);
-    if (!old) tick(g, track, x, y, C.people);
-    mark(g, x, y, { ...track, old: Boolean(old), what });
     return { track, what, x, y, gap: (what === "SAFE" ? 1.7 : 2.6) * radius() };
   });
+  const worstFirst = [...marks].sort((a, b) => ORDER.indexOf(a.what) - ORDER.indexOf(b.what));
+  for (const { track, what, x, y } of [...worstFirst].reverse()) {
+    if (!old) tick(g, track, x, y, C.people);
+    mark(g, x, y, { ...track, old: Boolean(old), what });
+  }
   const t = size("tick"), { box } = chart;
   const corners = [{ ...box, right: box.left + 12 * t, bottom: box.top + 1.3 * t }, { ...box, right: box.left + 14 * t, top: box.bottom - 1.3 * t }];
   if (old) {
@@ -164,11 +167,11 @@ export function drawPeople(g) {
     corners.push({ ...box, bottom: box.top + 2.7 * t });
   }
   const taken = [...chart.words, ...corners, ...[...marks, ...lost().map((one) => ({ x: chart.at(one.position)[0], y: chart.at(one.position)[1], gap: 1.5 * radius() }))].map((m) => around(m.x, m.y, m.gap))];
-  // Whose level is worst has the first choice of place.
-  for (const { track, what, x, y, gap } of [...marks].sort((a, b) => ORDER.indexOf(a.what) - ORDER.indexOf(b.what))) {
-    beside(g, title(track, what), x, y, gap + 3, taken, { colour: old ? C.stale : COLOUR[what], weight: what === "SAFE" ? 400 : 700 });
-  }
-  for (const one of lost()) beside(g, `${code(one)} ${ago(one)}`, ...chart.at(one.position), 1.5 * radius() + 4, taken, { colour: C.text, weight: 400 });
+  // Whose level is worst has the first choice of place, and lies on top.
+  const labels = worstFirst.map(({ track, what, x, y, gap }) =>
+    beside(g, title(track, what), x, y, gap + 3, taken, { colour: old ? C.stale : COLOUR[what], weight: what === "SAFE" ? 400 : 700 }));
+  for (const one of lost()) labels.push(beside(g, `${code(one)} ${ago(one)}`, ...chart.at(one.position), 1.5 * radius() + 4, taken, { colour: C.text, weight: 400 }));
+  for (const draw of labels.reverse()) draw();
   return { tracks: marks.map(({ track, what }) => [code(track), track.status, old ? "" : what]), lost: lost().map((one) => `${code(one)} ${ago(one)}`), unknown: old };
 }
 
