@@ -166,7 +166,9 @@ def everybody(people: People, sigmas: float = 3.0) -> tuple[Boxes, tuple[str, ..
     if people.reason or not len(tracked):
         return NO_BOXES, ()
     picked = np.flatnonzero(counts(tracked))
-    return boxes_of(tracked, sigmas).take(picked), tuple(name_of(tracked, k) for k in picked)
+    return boxes_of(tracked, sigmas).take(picked), tuple(
+        name_of(tracked, k) for k in picked.tolist()
+    )
 
 
 def lost_boxes(lost: tuple[Missing, ...]) -> Boxes:
@@ -188,7 +190,7 @@ def _vanished(before: Seen | None, seen: Seen) -> tuple[Missing, ...]:
     sure = np.flatnonzero(before.status != Status.TENTATIVE)
     return tuple(
         Missing(int(before.id[k]), _place(before, k), float(before.last_seen[k]), seen.time)
-        for k in sure
+        for k in sure.tolist()
         if int(before.id[k]) not in told
     )
 

@@ -26,7 +26,7 @@ from backend.safety.swing_arcs import Objects, judge_swing
 from backend.safety.swing_risk import Risk, Swing
 from backend.spatial import transform
 from backend.spatial.boxes import NO_BOXES, Boxes, concatenated
-from backend.spatial.types import Array
+from backend.spatial.types import AnyArray, Array, IntArray
 
 SIGMAS = 3.0
 HORIZON = 1.0
@@ -72,7 +72,7 @@ def people_concern(
 
 def _around(
     present: People, watch: Watch, now: float
-) -> tuple[Boxes, tuple[str, ...], Array, Array, Array]:
+) -> tuple[Boxes, tuple[str, ...], Array, Array, IntArray]:
     """Who limits: boxes (k), names, velocities (k, 3), least speeds nearer (k,), and which of the
     tracks they are, -1 for those who were lost lately.
     """
@@ -80,7 +80,10 @@ def _around(
     picked = np.flatnonzero(counts(tracked)) if len(tracked) else np.zeros(0, np.int64)
     lost = tuple(one for one in present.lost if now - one.lost < watch.remembered)
     everybody = boxes_of(tracked, SIGMAS).take(picked) if len(tracked) else NO_BOXES
-    names = (*(name_of(tracked, k) for k in picked), *(f"person:P{one.id}" for one in lost))
+    names = (
+        *(name_of(tracked, k) for k in picked.tolist()),
+        *(f"person:P{one.id}" for one in lost),
+    )
     velocity = np.zeros((len(names), 3))
     velocity[: len(picked), :2] = tracked.velocity[picked]
     least = np.zeros(len(names))
@@ -209,19 +212,18 @@ def _swing(own: str, machine: Machine, state: MachineState, memory: PeopleState)
     )
 
 
-def _picked(risks: Risks, picked: Array) -> Risks:
+def _picked(risks: Risks, picked: IntArray) -> Risks:
     """Of those who limit; who was lost lately has no risk of its own."""
-    index = np.asarray(picked, dtype=np.int64)
-    here = index >= 0
-    safe = np.where(here, index, 0)
+    here = picked >= 0
+    safe = np.where(here, picked, 0)
     if not len(risks.level):
-        k = len(index)
+        k = len(picked)
         never = np.full(k, np.inf)
         none = np.zeros(k, np.int64)
         return Risks(none, never, never, never, never, none, none)
 
-    def take(values: Array, otherwise: float) -> Array:
-        return np.where(here, values[safe], otherwise)
+    def take(values: AnyArray, otherwise: float) -> AnyArray:
+        return np.asarray(np.where(here, values[safe], otherwise))
 
     return Risks(
         take(risks.body, 0).astype(np.int64),

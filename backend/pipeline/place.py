@@ -47,10 +47,11 @@ def between(machine: Machine, before: FusedPose, after: FusedPose, at: float) ->
         wrap(after.joints - before.joints),
         after.joints - before.joints,
     )
-    angles = {
-        name: interpolate(getattr(before, name), getattr(after, name), share)
-        for name in ("yaw", "pitch", "roll")
-    }
-    position = before.position + share * (after.position - before.position)
-    pose = replace(before, position=position, **angles)
+    pose = replace(
+        before,
+        position=before.position + share * (after.position - before.position),
+        yaw=interpolate(before.yaw, after.yaw, share),
+        pitch=interpolate(before.pitch, after.pitch, share),
+        roll=interpolate(before.roll, after.roll, share),
+    )
     return place(machine, before.joints + share * turned, base_transform(pose))

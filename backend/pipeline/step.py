@@ -78,7 +78,8 @@ def step(state: State, inputs: Inputs, now: float, config: Config) -> tuple[Stat
     }
     gauge = gauge_now(state.gauge, inputs.gauge, machines, config)
     driven = frozenset(inputs.driven)
-    memory, people, somebody = state.people, None, ()
+    memory, people = state.people, None
+    somebody: tuple[Concern, ...] = ()
     if config.people is not None:
         memory = people_after(state.people, inputs.people, machines, now)
         people, somebody = _people(memory, machines, driven, now, config)

@@ -13,7 +13,7 @@ import numpy as np
 from backend.safety.people import Risks
 from backend.safety.swing_risk import Boundaries, Swing, reached, risk, speeding
 from backend.spatial.angles import wrap
-from backend.spatial.types import Array
+from backend.spatial.types import Array, IntArray
 
 SAMPLES = 7  # of an edge
 _EDGES = [(a, b) for a in range(8) for b in range(a + 1, 8) if bin(a ^ b).count("1") == 1]
@@ -80,7 +80,7 @@ def _judged(
     objects: Objects,
     turned: float,
     uncertainty: float,
-) -> tuple[Array, Array, Array]:
+) -> tuple[Array, Array, IntArray]:
     """(b, k) time to collision, (b, k) warning index, (k,) side that comes nearer."""
     far = np.maximum(np.linalg.norm(objects.place, axis=1), 1e-6)
     at, angle = np.maximum(points[0], 1e-6)[:, :, None], points[1][:, :, None]

@@ -12,7 +12,7 @@ from typing import Any, Generic, TypeVar
 from backend.shell.priority import set_niceness
 
 NICENESS = 2
-"""The fast loop goes before such work when processors are short."""
+"""The fast loop goes before images when processors are short."""
 
 Question = TypeVar("Question")
 Answer = TypeVar("Answer")
@@ -26,12 +26,19 @@ class Aside(Generic[Question, Answer]):
     """Asks a process of its own. One caller at a time.
 
     begin: called once in the process, it makes what answers; it can be pickled, as functions of
-    modules and `partial`s of them can. work: what the process does, in words ("makes images").
+    modules and `partial`s of them can. work: what the process does, in words ("makes images");
+    niceness: of the process.
     """
 
-    def __init__(self, begin: Callable[[], Callable[[Question], Answer]], work: str) -> None:
+    def __init__(
+        self,
+        begin: Callable[[], Callable[[Question], Answer]],
+        work: str,
+        niceness: int = NICENESS,
+    ) -> None:
         self._begin = begin
         self._work = work
+        self._niceness = niceness
         self._process: Any = None
         self._connection: Connection | None = None
 
@@ -68,16 +75,20 @@ class Aside(Generic[Question, Answer]):
         context = multiprocessing.get_context("spawn")
         ours, theirs = context.Pipe()
         # Daemonic: it ends with this process; killed outright, it meets the end of the pipe.
-        self._process = context.Process(target=_answer, args=(theirs, self._begin), daemon=True)
+        self._process = context.Process(
+            target=_answer, args=(theirs, self._begin, self._niceness), daemon=True
+        )
         self._process.start()
         theirs.close()
         self._connection = ours
         return ours
 
 
-def _answer(connection: Connection, begin: Callable[[], Callable[[Any], Any]]) -> None:
+def _answer(
+    connection: Connection, begin: Callable[[], Callable[[Any], Any]], niceness: int
+) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's to answer
-    set_niceness(NICENESS)
+    set_niceness(niceness)
     answer = begin()
     while True:
         try:

@@ -55,7 +55,7 @@ def begin() -> Callable[[Question], Seen]:
 
 
 def people_worker() -> Aside[Question, Seen]:
-    return Aside(begin, "looks for people")
+    return Aside(begin, "looks for people", niceness=0)  # before images: motions wait for it
 
 
 class PeopleLoop:

@@ -228,7 +228,7 @@ class Recording(Table):
     """What a running cockpit records. folder: of all recordings, relative to the site file; empty
     for $EXCAVATOR_COCKPIT_RECORDINGS or ~/.local/state/excavator-cockpit/recordings. The oldest
     parts beyond max_gib [GiB] and max_hours [h] are deleted, except those that are pinned. clouds:
-    points of LiDARs, too, about 12 GiB an hour each.
+    points of LiDARs, too, about 8 GiB an hour each.
     """
 
     enabled: bool = True

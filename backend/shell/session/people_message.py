@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from backend.pipeline.people_records import Missing, Seen, Sensor
-from backend.spatial.types import Array
 from backend.tracking.records import STATE
 
 
@@ -27,9 +26,12 @@ def people_message(seen: Seen) -> dict[str, Any]:
 def seen_of(document: dict[str, Any]) -> Seen:
     """Raises ValueError, TypeError or KeyError for what is no such message."""
     k = len(document["id"])
-    whole = {name: np.array(document[name], dtype=np.int64) for name in _WHOLE}
-    arrays = {name: _array(document[name], (k, *shape)) for name, shape in _SHAPES.items()}
-    if any(values.shape != (k,) for values in whole.values()):
+    identity, status = (np.array(document[name], dtype=np.int64) for name in _WHOLE)
+    state, cov, ahead, ahead_cov, last_seen = (
+        np.array(document[name], dtype=np.float64).reshape(k, *shape)
+        for name, shape in _SHAPES.items()
+    )
+    if identity.shape != (k,) or status.shape != (k,):
         raise ValueError("people: id and status must be as long as each other")
     sensors = tuple(
         Sensor(
@@ -43,12 +45,9 @@ def seen_of(document: dict[str, Any]) -> Seen:
         for m in document["lost"]
     )
     return Seen(
-        float(document["time"]), float(document["ready"]), sensors, **whole, **arrays, lost=lost
-    )
-
-
-def _array(values: Any, shape: tuple[int, ...]) -> Array:
-    return np.array(values, dtype=np.float64).reshape(shape)
+        float(document["time"]), float(document["ready"]), sensors, identity, status, state, cov,
+        ahead, ahead_cov, last_seen, lost,
+    )  # fmt: skip
 
 
 def _place(values: Any) -> tuple[float, float, float]:
