@@ -10,9 +10,11 @@ from pathlib import Path
 from typing import Any
 
 import httpx
+import numpy as np
 import pytest
 
 from backend.errors import InputError
+from backend.pipeline.people_records import NOBODY, People
 from backend.shell.app.app import Sources, create_app
 from backend.shell.app.feed import Frames
 from backend.shell.app.metrics import Metric, exposition, metrics_router, read_token
@@ -175,3 +177,17 @@ def test_a_token_file_is_private_and_long_enough(tmp_path: Path) -> None:
         path.write_text(text)
         with pytest.raises(InputError, match="holds no token"):
             read_token(path)
+
+
+def test_people_are_counted_where_somebody_watches(served: Served, snapshot: Any) -> None:
+    served.hub.publish(snapshot)
+    assert not [name for name, _ in served.values() if name.startswith("cockpit_people")]
+    some = replace(NOBODY, id=np.arange(3), kind=("person", "object", "person"))
+    for reason, known in (("", 1.0), ("no LiDAR data for 0.8 s", 0.0)):
+        served.hub.publish(replace(snapshot, people=People(reason, 0.25, tracked=some)))
+        values = served.values()
+        assert values[key("cockpit_people_known")] == known
+        assert values[key("cockpit_people_age_seconds")] == 0.25
+        assert values[key("cockpit_people_tracks", kind="person")] == 2.0
+        assert values[key("cockpit_people_tracks", kind="object")] == 1.0
+        assert values[key("cockpit_people_lost")] == 0.0

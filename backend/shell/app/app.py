@@ -180,6 +180,8 @@ def _health(newest: Snapshot | None, sources: Sources) -> dict[str, Any]:
         if state.pose.validity is not Validity.VALID:
             label = sources.site["machines"][state.pose.machine]["label"]
             status.extend(f"{label} {reason}" for reason in state.pose.reasons)
+    if newest is not None and newest.people is not None and newest.people.reason:
+        status.append(f"people: {newest.people.reason}")
     counters: dict[str, Any] = {"malformed": {}, "foreign": {}, "lost": 0}
     if newest is not None:
         counters = {

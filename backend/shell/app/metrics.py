@@ -16,6 +16,7 @@ from fastapi import APIRouter, HTTPException, Request, Response
 
 from backend.errors import InputError
 from backend.fusion.pose import Validity
+from backend.pipeline.people_records import OBJECT, PERSON
 from backend.pipeline.records import Snapshot
 from backend.shell.app.feed import Frames
 from backend.shell.private_file import check_private
@@ -137,6 +138,7 @@ def _of_frames(frames: Frames) -> Iterator[Metric]:
     for (kind, key), image in frames.hub.images().items():
         images.add(newest.time - image.state_time + (since or 0.0), kind=kind, key=key)
     yield from (cycles, alarms, images, *_of_machines(newest), *_of_link(newest))
+    yield from _of_people(newest)
 
 
 def _of_machines(snapshot: Snapshot) -> Iterator[Metric]:
@@ -157,6 +159,22 @@ def _of_machines(snapshot: Snapshot) -> Iterator[Metric]:
             received.add(status.received, machine=name, stream=stream)
             refused.add(status.rejected, machine=name, stream=stream)
     yield from (valid, validity, age, rate, received, refused)
+
+
+def _of_people(snapshot: Snapshot) -> Iterator[Metric]:
+    people = snapshot.people
+    if people is None:
+        return
+    age = Metric("cockpit_people_age_seconds", "gauge", "Since the newest scan of a LiDAR.")
+    age.add(people.age)
+    known = Metric("cockpit_people_known", "gauge", "1 while it is known who is around.")
+    known.add(not people.reason)
+    tracks = Metric("cockpit_people_tracks", "gauge", "People and objects that are followed.")
+    for kind in (PERSON, OBJECT):
+        tracks.add(people.tracked.kind.count(kind), kind=kind)
+    lost = Metric("cockpit_people_lost", "gauge", "Those who are told as last seen somewhere.")
+    lost.add(len(people.lost))
+    yield from (age, known, tracks, lost)
 
 
 def _of_link(snapshot: Snapshot) -> Iterator[Metric]:
