@@ -43,12 +43,12 @@ class Noise:
     rate, as nobody walks in circles; stay: mean time in one model [s].
     """
 
-    acceleration: tuple[float, float, float] = (0.5, 0.3, 2.0)
+    acceleration: tuple[float, float, float] = (0.1, 0.1, 2.0)
     turn: tuple[float, float, float] = (0.1, 4.0, 0.1)
     vertical: float = 0.05
     yaw: float = 0.5
     size: float = 0.01
-    fade: float = 4.0
+    fade: float = 12.0
     turned: float = 0.4
     stay: float = 2.0
 
