@@ -114,7 +114,7 @@ def later(tracks: Tracks, horizon: float, noise: Noise | None = None) -> tuple[A
     return ahead(modes, horizon, noise or Noise()) if len(tracks) else mixture(modes)
 
 
-def _aged(tracks: Tracks, time: float, modes: Modes, hit: Array, settings: Settings) -> Tracks:
+def _aged(tracks: Tracks, time: float, modes: Modes, hit: BoolArray, settings: Settings) -> Tracks:
     scans, seen = tracks.scans + 1, tracks.seen + hit
     sure = (tracks.status != _TENTATIVE) | (seen >= settings.confirm)
     status = np.where(sure, np.where(hit, _CONFIRMED, _COASTING), _TENTATIVE)
