@@ -15,6 +15,7 @@ from backend.tracking.records import PX, PY, Detections
 PERIOD, SECONDS = 0.1, 20.0
 SIGMA, DETECTED, CLUTTER = 0.06, 0.95, 1e-3  # [m], [-], false detections per square metre
 AROUND = 12.0  # half the side of the square in which false ones are [m]
+BODY = 0.4  # nearest that two people's middles come [m]
 KINDS = ("crossing", "parallel", "crowded", "occluded")
 
 
@@ -27,7 +28,7 @@ class Ways(NamedTuple):
 
 def ways(kind: str, seed: int) -> Ways:
     """crossing: four people meet in one point within half a second; parallel: two pairs side by
-    side, 0.7 m apart; crowded: eight people wander within 5 x 5 m; occluded: two pass behind a
+    side, 0.7 m apart; crowded: eight people wander within 6 x 6 m; occluded: two pass behind a
     third who stands near the sensor in the origin, for one to two seconds each.
     """
     rng = np.random.default_rng(seed)
@@ -66,11 +67,17 @@ def _parallel(t: np.ndarray, rng: np.random.Generator) -> np.ndarray:
 
 
 def _crowded(t: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Each about a place of its own, all places 1.6 m apart, by up to 1.2 m: they do meet."""
-    homes = 1.6 * np.array([[i % 3 - 1, i // 3 - 1] for i in range(8)])
-    w, phase = rng.uniform(0.3, 0.9, (2, 8)), rng.uniform(0.0, 2.0 * np.pi, (2, 8))
-    x, y = (homes[:, k] + 1.2 * np.sin(t[:, None] * w[k] + phase[k]) for k in range(2))
-    return np.stack([x, y], axis=-1)
+    """Each about a place of its own, all places 1.6 m apart, by up to 1.2 m: they do meet, but none
+    walks through another.
+    """
+    out: list[np.ndarray] = []
+    while len(out) < 8:
+        home = 1.6 * np.array([len(out) % 3 - 1, len(out) // 3 - 1])
+        w, phase = rng.uniform(0.3, 0.9, 2), rng.uniform(0.0, 2.0 * np.pi, 2)
+        way = home + 1.2 * np.sin(t[:, None] * w + phase)
+        if all(np.linalg.norm(way - other, axis=1).min() > BODY for other in out):
+            out.append(way)
+    return np.stack(out, axis=1)
 
 
 def _occluded(t: np.ndarray, rng: np.random.Generator) -> np.ndarray:
