@@ -61,7 +61,7 @@ def moved(model: int, x: Array, dt: float, noise: Noise) -> Array:
     out = x.copy()
     if model == RANDOM:
         kept = np.exp(-dt / noise.fade)
-        way = noise.fade * (1.0 - kept)
+        way = -noise.fade * np.expm1(-dt / noise.fade)
         out[..., PX] += way * x[..., VX]
         out[..., PY] += way * x[..., VY]
         out[..., PZ] += way * x[..., VZ]
