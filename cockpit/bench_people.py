@@ -28,10 +28,10 @@ def people_rows() -> list[BenchRow]:
     """The tracker alone, among clutter and in a crowd, and all from points to tracks."""
     three = _tracked(_walkers(np.random.default_rng(0)))
     crowd = _tracked(_crowd(np.random.default_rng(1)))
-    rows = percentile_rows("tracks, 3 people and clutter, a scan", three, 1.0)
+    rows = percentile_rows("tracks and 1 s ahead, 3 people and clutter", three, 1.0)
     return [
         *rows,
-        *percentile_rows("tracks, 20 people on 2 m², a scan", crowd, 50.0),
+        *percentile_rows("tracks and 1 s ahead, 20 people on 2 m²", crowd, 50.0),
         *_from_points(),
     ]
 

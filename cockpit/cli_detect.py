@@ -13,7 +13,7 @@ def detect(
         list[Path],
         typer.Argument(
             metavar="CLOUD...",
-            help="PCD, PLY or LAS files, z up [m]; several are scans in the order of their times.",
+            help="PCD, PLY or LAS files, in metres, z up; several are scans, in their order.",
         ),
     ],
     json_: Annotated[bool, typer.Option("--json", help="Print JSON instead of words.")] = False,
@@ -24,15 +24,16 @@ def detect(
         bool, typer.Option(help="Look for the ground and take it out; or there is none.")
     ] = True,
     link: Annotated[
-        float, typer.Option(help="Points nearer than this are one object, 0.1 to 2 [m].")
+        float, typer.Option(help="Points nearer than this are one object, 0.1 to 2 m.")
     ] = 0.4,
     origin: Annotated[
-        str, typer.Option(help="The sensor's place x,y,z [m]; else a PCD's viewpoint, or 0,0,0.")
+        str,
+        typer.Option(help="The sensor's place x,y,z in metres; else a PCD's viewpoint, or 0,0,0."),
     ] = "",
     reach: Annotated[
-        float, typer.Option(help="Only what is nearer than this to the sensor counts [m].")
+        float, typer.Option(help="Only what is within this many metres of the sensor counts.")
     ] = 25.0,
-    period: Annotated[float, typer.Option(help="Time from one file to the next [s].")] = 0.1,
+    period: Annotated[float, typer.Option(help="Seconds from one file to the next.")] = 0.1,
     stamped: Annotated[
         bool,
         typer.Option("--stamped", help="Files are named by their times, e.g. 1700000000.1.pcd."),

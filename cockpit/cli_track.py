@@ -32,7 +32,7 @@ def track(
     kitti: Annotated[
         bool, typer.Option("--kitti", help="KITTI tracking labels, whatever the file's name.")
     ] = False,
-    period: Annotated[float, typer.Option(help="From one KITTI frame to the next [s].")] = 0.1,
+    period: Annotated[float, typer.Option(help="Seconds from one KITTI frame to the next.")] = 0.1,
 ) -> None:
     """Follow people and objects through recorded detections, and say where they are in a second."""
     from backend.tracking.records import Settings

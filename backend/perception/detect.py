@@ -20,6 +20,8 @@ from backend.perception.kernels import inside
 from backend.spatial.boxes import Boxes
 from backend.spatial.types import Array, BoolArray, IntArray
 
+_FARTHEST = 1e8  # [m]
+
 
 @dataclass(frozen=True)
 class Settings:
@@ -86,13 +88,13 @@ def detect(
 
     points: (n, 3) in the site frame, z up [m]; origin: (3,) of the sensor, or (n, 3) of each
     point's own; machines: all machines' bodies where they are now; plane: the ground when it is
-    known. Points that are no numbers are left out.
+    known. Points that are no numbers, or not of this world, are left out.
     """
     settings = settings or Settings()
     points = np.asarray(points, dtype=float)
     if points.ndim != 2 or points.shape[1] != 3:
         raise InputError(f"detection: points have the shape {points.shape}; needed is (n, 3).")
-    finite = np.asarray(np.isfinite(points).all(axis=1))
+    finite = _sane(points)
     safe = np.where(finite[:, None], points, 0.0)
     origin = np.broadcast_to(origin, points.shape)
     near = finite & (np.hypot(*(safe - origin)[:, :2].T) <= settings.reach)
@@ -133,11 +135,16 @@ def detect_above(
     points = np.asarray(points, dtype=float)
     lowest = 0.0
     if points.ndim == 2 and points.shape[1] == 3:
-        finite = points[np.isfinite(points).all(axis=1)]
+        finite = points[_sane(points)]
         near = np.hypot(*(finite - origin)[:, :2].T) <= settings.reach
         lowest = float(finite[near, 2].min()) if near.any() else 0.0
     level = Plane(np.array([0.0, 0.0, 1.0]), lowest, 0.0)
     return detect(points, origin, machines, replace(settings, low=0.0), level)
+
+
+def _sane(points: Array) -> BoolArray:
+    """(n,) whether all three are numbers, and no farther than coordinates of the earth."""
+    return np.asarray((np.abs(points) < _FARTHEST).all(axis=1))
 
 
 def _objects(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from backend.pipeline.people_records import (
     NOBODY,
     OBJECT,
     PERSON,
+    Judged,
     Missing,
     People,
     Seen,
@@ -40,6 +41,8 @@ MOVING = 0.5
 """Objects faster than this are judged as people are [m/s]."""
 OVERLOOKED = 0.3
 """The lowest of somebody that a LiDAR may miss, down to the ground [m]."""
+JUDGED = 0.09
+"""Risks of the swing hold until the next scan, and no longer than this [s]."""
 SMOOTHED = 0.25
 """Time over which the swing's acceleration is taken [s]."""
 
@@ -47,13 +50,16 @@ SMOOTHED = 0.25
 @dataclass(frozen=True)
 class PeopleState:
     """What a cycle hands to the next. seen: newest scan; sensors: newest of each LiDAR; lost: whose
-    places are told; swings: (time, swing rates by machine) of the last moments [s, rad/s].
+    places are told; swings: (time, swing rates by machine) of the last moments [s, rad/s]; judged: of
+    the tracks of `seen` by own machine, while that is recent enough; judged_at [s].
     """
 
     seen: Seen | None = None
     sensors: tuple[Sensor, ...] = ()
     lost: tuple[Missing, ...] = ()
     swings: tuple[tuple[float, Mapping[str, float]], ...] = ()
+    judged: Mapping[str, Judged] = field(default_factory=dict)
+    judged_at: float = -math.inf
 
     def acceleration(self, machine: str) -> float:
         """Of the machine's swing over the last moments [rad/s^2], 0 while that is not known."""
@@ -71,7 +77,8 @@ def following(
     swings = (*(s for s in before.swings if now - s[0] < SMOOTHED), (now, rates))
     if seen is None or (before.seen is not None and seen.time < before.seen.time):
         lost = tuple(one for one in before.lost if now - one.lost < TOLD)
-        return PeopleState(before.seen, before.sensors, lost, swings)
+        judged = before.judged if now - before.judged_at < JUDGED else {}
+        return PeopleState(before.seen, before.sensors, lost, swings, judged, before.judged_at)
     newest = {(s.machine, s.name): s for s in (*before.sensors, *seen.sensors)}
     sure = seen.status != Status.TENTATIVE
     gone = _vanished(before.seen, seen)

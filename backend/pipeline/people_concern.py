@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from backend.collision.box_distance import pair_distances
+from backend.collision.box_distance import lower_bounds, pair_distances
 from backend.collision.scene import moving
 from backend.collision.server import closest
 from backend.fusion.inflation import spread
@@ -44,6 +44,7 @@ def people_concern(
 ) -> tuple[Concern, Judged | None]:
     """The verdict on one own machine, and what it is based on; that is None when unknown.
 
+    What stands in `memory.judged` is not judged anew; distances and brakes are, in every cycle.
     driven: somebody controls it from here, so that braking distances are judged, too.
     """
     watch = config.people
@@ -55,12 +56,16 @@ def people_concern(
         return judging.unknown(own, joints, f"{config.labels[own]} {reason}", now), None
     if present.reason:
         return judging.unknown(own, joints, f"people: {present.reason}", now), None
-    judged = _judged(own, machine, state, present, memory, watch)
+    judged = memory.judged.get(own)
+    if judged is None:
+        judged = _judged(own, machine, state, present, memory, watch)
     boxes, names, velocity, least, picked = _around(present, watch, now)
     risks = _picked(judged.risks, picked)
     doubt = spread(machine, state.pose)
-    scene = moving(boxes, names)
-    found = closest(scene, state.body.boxes, watch.slow_below + doubt)
+    reach = watch.slow_below + doubt
+    near = bool((lower_bounds(state.body.boxes, boxes) <= reach).any())
+    scene = moving(boxes, names) if near else moving(NO_BOXES)
+    found = closest(scene, state.body.boxes, reach)
     rows = rows_to(machine, state, scene, found, doubt, velocity)
     approach = (
         _approach(machine, state, boxes, names, velocity, least, now, watch) if driven else None

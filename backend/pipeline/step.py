@@ -82,7 +82,7 @@ def step(state: State, inputs: Inputs, now: float, config: Config) -> tuple[Stat
     somebody: tuple[Concern, ...] = ()
     if config.people is not None:
         memory = people_after(state.people, inputs.people, machines, now)
-        people, somebody = _people(memory, machines, driven, now, config)
+        memory, people, somebody = _people(memory, machines, driven, now, config)
     pairs, close, unknown = measure(machines, config)
     margins = (
         {name: machine_margins(name, machines, pairs, config, gauge, people) for name in config.own}
@@ -184,8 +184,8 @@ def _people(
     driven: frozenset[str],
     now: float,
     config: Config,
-) -> tuple[People, tuple[Concern, ...]]:
-    """Everybody now, and what they mean for each own machine."""
+) -> tuple[PeopleState, People, tuple[Concern, ...]]:
+    """What the next cycle needs, everybody now, and what they mean for each own machine."""
     assert config.people is not None
     here = present(memory, config.people, now)
     concerns: list[Concern] = []
@@ -197,7 +197,9 @@ def _people(
         concerns.append(concern)
         if why is not None:
             judged[name] = why
-    return replace(here, judged=judged), tuple(concerns)
+    if not memory.judged:
+        memory = replace(memory, judged=judged, judged_at=now)
+    return memory, replace(here, judged=judged), tuple(concerns)
 
 
 def _notices(

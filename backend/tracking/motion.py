@@ -43,12 +43,12 @@ class Noise:
     rate, as nobody walks in circles; stay: mean time in one model [s].
     """
 
-    acceleration: tuple[float, float, float] = (0.5, 0.3, 2.0)
+    acceleration: tuple[float, float, float] = (0.1, 0.1, 2.0)
     turn: tuple[float, float, float] = (0.1, 4.0, 0.1)
     vertical: float = 0.05
     yaw: float = 0.5
     size: float = 0.01
-    fade: float = 4.0
+    fade: float = 12.0
     turned: float = 0.4
     stay: float = 2.0
 
@@ -61,7 +61,7 @@ def moved(model: int, x: Array, dt: float, noise: Noise) -> Array:
     out = x.copy()
     if model == RANDOM:
         kept = np.exp(-dt / noise.fade)
-        way = noise.fade * (1.0 - kept)
+        way = -noise.fade * np.expm1(-dt / noise.fade)
         out[..., PX] += way * x[..., VX]
         out[..., PY] += way * x[..., VY]
         out[..., PZ] += way * x[..., VZ]

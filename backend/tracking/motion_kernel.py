@@ -18,9 +18,9 @@ def turned(x: Array, dt: float, fade: float) -> Array:
     Rasul 2021, Eqs. (4)-(5), in Cartesian form; the turn rate's mean over dt turns the velocity.
     """
     out = x.copy()
-    left = np.exp(-dt / fade)
+    left, mean = np.exp(-dt / fade), -fade * np.expm1(-dt / fade)
     for k in range(len(x)):
-        angle = fade * (1.0 - left) * x[k, TURN]
+        angle = mean * x[k, TURN]
         sine, cosine = np.sin(angle), np.cos(angle)
         if abs(angle) < _STRAIGHT:
             ahead, aside = dt * (1.0 - angle**2 / 6.0), dt * (0.5 * angle)

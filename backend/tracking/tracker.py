@@ -34,6 +34,7 @@ _SEEN = 0.5  # probability above which a track counts as detected, or a detectio
 _SAME = 0.15  # tracks whose means are nearer than this are one [m]
 _LONGEST = 0.25  # [s] of one prediction
 _NONE = np.zeros(0, np.int64)
+_TENTATIVE, _CONFIRMED, _COASTING = (int(status) for status in Status)
 
 
 class Tracked(NamedTuple):
@@ -113,14 +114,13 @@ def later(tracks: Tracks, horizon: float, noise: Noise | None = None) -> tuple[A
     return ahead(modes, horizon, noise or Noise()) if len(tracks) else mixture(modes)
 
 
-def _aged(tracks: Tracks, time: float, modes: Modes, hit: Array, settings: Settings) -> Tracks:
+def _aged(tracks: Tracks, time: float, modes: Modes, hit: BoolArray, settings: Settings) -> Tracks:
     scans, seen = tracks.scans + 1, tracks.seen + hit
-    sure = (tracks.status != Status.TENTATIVE) | (seen >= settings.confirm)
-    status = np.where(sure, np.where(hit, Status.CONFIRMED, Status.COASTING), Status.TENTATIVE)
+    sure = (tracks.status != _TENTATIVE) | (seen >= settings.confirm)
+    status = np.where(sure, np.where(hit, _CONFIRMED, _COASTING), _TENTATIVE)
     last = np.where(hit, time, tracks.last_seen)
     return Tracks(
-        time, modes.mean, modes.cov, modes.mode, tracks.id, status.astype(np.int64), scans,
-        seen.astype(np.int64), last,
+        time, modes.mean, modes.cov, modes.mode, tracks.id, status, scans, seen, last,
     )  # fmt: skip
 
 
@@ -129,7 +129,7 @@ def _kept(tracks: Tracks, settings: Settings) -> tuple[IntArray, tuple[Lost, ...
     if not len(tracks):
         return np.zeros(0, np.int64), ()
     mean, cov = now(tracks)
-    tentative = tracks.status == Status.TENTATIVE
+    tentative = tracks.status == _TENTATIVE
     unseen = tracks.time - tracks.last_seen
     too_long = unseen > np.where(tentative, settings.coast_tentative, settings.coast) + 1e-9
     unsure = tentative & (tracks.scans >= settings.confirm_of)
@@ -145,17 +145,16 @@ def _kept(tracks: Tracks, settings: Settings) -> tuple[IntArray, tuple[Lost, ...
 
 def _twice(tracks: Tracks, mean: Array) -> BoolArray:
     """(n,) tracks that follow what an older one follows."""
-    n = len(tracks)
-    apart = np.linalg.norm(mean[:, None, :2] - mean[None, :, :2], axis=2)
-    younger = tracks.id[:, None] > tracks.id[None]
-    unsure = (tracks.status == Status.TENTATIVE)[:, None]
-    return np.asarray(((apart < _SAME) & younger & unsure & ~np.eye(n, dtype=bool)).any(axis=1))
+    x, y = mean[:, PX], mean[:, PY]
+    near = np.hypot(x[:, None] - x, y[:, None] - y) < _SAME
+    younger = tracks.id[:, None] > tracks.id
+    return np.asarray((near & younger).any(axis=1) & (tracks.status == _TENTATIVE))
 
 
 def _begun(seen: Detections, free: IntArray, next_id: int, settings: Settings) -> Tracks:
     modes = born(seen.values[free], seen.measured, seen.noise, settings.born_speed)
     k = len(free)
-    status = Status.CONFIRMED if settings.confirm == 1 else Status.TENTATIVE
+    status = _CONFIRMED if settings.confirm == 1 else _TENTATIVE
     return Tracks(
         seen.time,
         *modes,

@@ -44,8 +44,7 @@ def sight(modes: Modes, seen: Detections, settings: Settings) -> Sight:
     arrays = (modes.mean, modes.cov, seen.values, seen.noise)
     plain = [np.ascontiguousarray(values, dtype=float) for values in arrays]
     off, gain, S, likelihood, squared, log_det = compare(*plain, h)
-    widest = log_det.argmax(axis=1)
-    nearest = np.take_along_axis(squared, widest[:, None, None], axis=1)[:, 0]
+    nearest = squared[np.arange(len(squared)), log_det.argmax(axis=1)]
     return Sight(off, gain, S, likelihood, nearest <= _gate(len(h), settings.gate))
 
 

@@ -31,8 +31,7 @@ def test_time_to_collision_against_integration() -> None:
             worst, late = max(worst, abs(found - true)), max(late, found - true)
     print(
         f"\n  {CASES} cases, {never} without a collision in {END:.0f} s: at most "
-        f"{worst * 1e3:.1f} ms off, {late * 1e3:.1f} ms late; "
-        f"{grazed} graze (a hair of clearance decides)"
+        f"{worst * 1e3:.1f} ms off, {late * 1e3:.1f} ms late; {grazed} graze (a hair decides)"
         "\n  expected: at most 5 ms off, none late by more than a step of 1 ms"
     )
     assert late <= DT

@@ -129,6 +129,13 @@ def test_nothing_and_nonsense() -> None:
     assert len(empty.objects.center) == 0
     bad = detect(np.full((100, 3), np.nan), np.zeros(3), NO_BOXES)
     assert not bad.near.any()
+    seen, _ = scene()
+    odd = np.concatenate([seen.points, [[3.0, 3.0, 1e300], [1e200, 0.0, 0.0], [0.0, 5.0, -np.inf]]])
+    with np.errstate(over="raise", invalid="raise"):
+        found = detect(odd, SENSOR[:3, 3], BODIES)
+    assert found.plane is not None
+    assert len(found.objects.center) == len(PEOPLE) + 1
+    assert not found.near[-3:].any()
     with pytest.raises(InputError, match="needed is"):
         detect(np.zeros((5, 2)), np.zeros(3), NO_BOXES)
     with pytest.raises(InputError, match="link"):

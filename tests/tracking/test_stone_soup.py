@@ -8,8 +8,15 @@ import numpy as np
 import pytest
 from people_metrics import gospa, ospa, switches
 from stone_soup_tracker import at, followed, shares
+from stonesoup.measures import Euclidean
+from stonesoup.metricgenerator.clearmotmetrics import ClearMotMetrics
+from stonesoup.metricgenerator.manager import MultiManager
 from stonesoup.metricgenerator.ospametric import GOSPAMetric, OSPAMetric
+from stonesoup.types.association import AssociationSet, TimeRangeAssociation
+from stonesoup.types.groundtruth import GroundTruthPath
 from stonesoup.types.state import State
+from stonesoup.types.time import TimeRange
+from stonesoup.types.track import Track
 
 from backend.tracking.association import associate
 from backend.tracking.records import PX, PY, Detections
@@ -74,6 +81,42 @@ def test_changes_of_identity_by_hand() -> None:
     assert switches(swapped, true) == 2
     gone = [(np.array([7, 9]), a), (np.zeros(0, int), a[:0]), (np.array([7, 8]), a), same[0]]
     assert switches(gone, true) == 2  # 9, 8, 9
+
+
+def clear_mot_switches(scans: list[tuple[np.ndarray, np.ndarray]], true: list[np.ndarray]) -> int:
+    """Stone Soup's CLEAR MOT, where nobody is missed and nothing is false: N (1 - MOTA)."""
+    people = [GroundTruthPath(id=f"person {k}") for k in range(len(true[0]))]
+    tracks: dict[int, Track] = {}
+    pairs = set()
+    for k, ((ids, places), truth) in enumerate(zip(scans, true, strict=True)):
+        for who, (x, y) in enumerate(truth):
+            people[who].append(State([[x], [y]], at(0.1 * k)))
+        for number, (x, y) in zip(ids.tolist(), places, strict=True):
+            one = tracks.setdefault(number, Track(id=f"track {number}"))
+            one.append(State([[x], [y]], at(0.1 * k)))
+            who = int(np.argmin(np.linalg.norm(truth - [x, y], axis=1)))
+            moment = TimeRange(at(0.1 * k - 0.01), at(0.1 * k + 0.01))
+            pairs.add(TimeRangeAssociation({people[who], one}, moment))
+    metric = ClearMotMetrics(distance_measure=Euclidean())
+    manager = MultiManager([metric])
+    manager.add_data({"groundtruth_paths": set(people), "tracks": set(tracks.values())})
+    manager.association_set = AssociationSet(pairs)
+    mota = next(m.value for m in metric.compute_metric(manager) if m.title == "MOTA")
+    return round(sum(map(len, people)) * (1.0 - mota))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_changes_of_identity(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    true = [np.array([[0.0, 0.0], [1.0, 0.2 * k], [3.0, 1.0]]) for k in range(12)]
+    scans, ids = [], np.array([4, 5, 6])
+    for truth in true:
+        if rng.random() < 0.3:
+            ids = rng.permutation(ids)
+        if rng.random() < 0.2:
+            ids = np.where(ids == ids[0], ids.max() + 1, ids)  # somebody is begun anew
+        scans.append((ids, truth + rng.uniform(-0.1, 0.1, (3, 2))))
+    assert switches(scans, true) == clear_mot_switches(scans, true) > 0
 
 
 def test_stone_soups_tracker_follows_two_walkers() -> None:
