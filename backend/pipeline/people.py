@@ -50,8 +50,8 @@ SMOOTHED = 0.25
 @dataclass(frozen=True)
 class PeopleState:
     """What a cycle hands to the next. seen: newest scan; sensors: newest of each LiDAR; lost: whose
-    places are told; swings: (time, swing rates by machine) of the last moments [s, rad/s]; judged: of
-    the tracks of `seen` by own machine, while that is recent enough; judged_at [s].
+    places are told; swings: (time, swing rates by machine) of the last moments [s, rad/s]; judged:
+    of the tracks of `seen` by own machine, while that is recent enough; judged_at [s].
     """
 
     seen: Seen | None = None
