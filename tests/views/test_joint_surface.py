@@ -26,7 +26,7 @@ BYTES = st.sampled_from(
 
 def brute_force(cells: np.ndarray) -> dict[str, int]:
     """Sides of cells per name, one by one."""
-    order = [("partner", 1), ("site", 2), ("self", 4), ("other", 255 - FREE)]
+    order = [("people", 8), ("partner", 1), ("site", 2), ("self", 4), ("other", 255 - FREE)]
 
     def kind(index: tuple[int, ...]) -> str:
         value = int(cells[index])
@@ -89,10 +89,10 @@ def test_a_block_of_cells_is_a_box() -> None:
 
 
 def test_the_first_cause_gives_the_colour() -> None:
-    cells = np.array([PARTNER | SITE | SELF, SITE | SELF, SELF, 8 | SELF, 8, COLLIDING, 0, FREE])
+    cells = np.array([PARTNER | SITE | SELF, SITE | SELF, SELF, 8 | SELF, 16, COLLIDING, 0, FREE])
     names = list(CAUSES)
     found = [names[k] if k >= 0 else None for k in causes(cells.astype(np.uint8))]
-    assert found == ["partner", "site", "self", "self", "other", "other", None, None]
+    assert found == ["partner", "site", "self", "people", "other", "other", None, None]
 
 
 def test_a_volume_of_the_usual_size_is_drawn_quickly() -> None:

@@ -11,6 +11,7 @@ import toy_site as toy
 import viser
 from viewing import counted, handle
 
+from backend.pipeline.people_records import NOBODY, People
 from backend.safety.swing_risk import Risk
 from backend.tracking.records import Status
 from cockpit.views import palette, people_shapes
@@ -191,5 +192,21 @@ def test_the_scene_shows_them_with_the_machines(server: viser.ViserServer) -> No
     scene = Scene(server.scene, toy.site())
     scene.update(toy.snapshot(), 0.0)
     assert not names(server)
-    scene.update(toy.snapshot(), 0.1, people=people(PERSON))
+    tracked = dataclasses.replace(
+        NOBODY,
+        id=np.array([7]),
+        kind=("person",),
+        status=np.array([Status.CONFIRMED]),
+        position=np.array([[3.0, 2.0, 0.9]]),
+        velocity=np.zeros((1, 2)),
+        yaw=np.zeros(1),
+        size=np.array([[0.5, 0.5, 1.7]]),
+        sigma=np.array([0.1]),
+        unseen=np.zeros(1),
+        ahead=np.array([[3.0, 2.0]]),
+        ahead_cov=0.1 * np.eye(2)[None],
+    )
+    told = dataclasses.replace(toy.snapshot(), people=People("", 0.1, tracked=tracked))
+    scene.update(told, 0.1)
     assert handle(server, "/people/boxes").visible
+    assert handle(server, "/people/track/7").text == "P7"
