@@ -262,9 +262,12 @@ class View:
         found = []
         for client_id, client in self._clients(page).items():
             if client_id not in self._browsers:
-                self._browsers[client_id] = Browser(
-                    client, self._site, self._own, self._camera, self._zone_kind
-                )
+                try:
+                    self._browsers[client_id] = Browser(
+                        client, self._site, self._own, self._camera, self._zone_kind
+                    )
+                except RuntimeError:
+                    continue  # its window was closed while its nodes were made
             found.append(self._browsers[client_id])
         return found
 

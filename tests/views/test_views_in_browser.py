@@ -70,7 +70,8 @@ class Scene:
         window.goto(f"http://127.0.0.1:{self.view.port}/?hideViserLogo&darkMode")
         assert until(lambda: len(self.ports() - before) == 1, 30.0)
         self.view.attach(page, (self.ports() - before).pop())
-        assert until(lambda: len(self.view._of(page)) == 1, 30.0)
+        # Only looked at: what is made for a window is made under the view's own lock.
+        assert until(lambda: len(self.view._clients(page)) == 1, 30.0)
         return window
 
     def close(self) -> None:
