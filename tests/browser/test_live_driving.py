@@ -160,7 +160,7 @@ def test_dig_swing_and_dump_by_stick_while_the_other_works(
     assert machines["left"]["mode"] == "remote"
     assert machines["left"]["holder"]
     assert machines["right"]["holder"] == ""
-    # RIGHT worked meanwhile. It pauses in its cycle and comes back to where it was: any look counts.
+    # RIGHT worked meanwhile; its cycle pauses, and comes back to where it was: any look counts.
     worked = {role: [look[role] for look in pad.partner] for role in start}
     assert max(max(values) - min(values) for values in worked.values()) > 0.05
     # What the page shows is what is sent.
