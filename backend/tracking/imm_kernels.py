@@ -8,7 +8,7 @@ from numba import njit
 from backend.spatial.types import Array
 from backend.tracking.motion import CT
 from backend.tracking.motion_kernel import turned
-from backend.tracking.records import YAW
+from backend.tracking.records import PZ, TURN, VX, VY, VZ, YAW
 
 
 @njit(cache=True, nogil=True)
@@ -88,49 +88,74 @@ def unscent(
 ) -> tuple[Array, Array]:
     """(n, s), (n, s, s) of the turning model through sigma points, at the roots of spread * cov.
 
-    of_mean, of_cov: (2 s + 1,) weights of the middle, then of the points on either side.
+    of_mean, of_cov: (2 s + 1,) weights of the middle, then of the points on either side. Only the
+    velocity and the turn rate turn anything: the root begins with them, and all its other columns,
+    which leave them as they are, move with the middle and are summed at once.
     """
     n, s = mean.shape
     to_mean, to_cov = np.zeros((n, s)), np.zeros((n, s, s))
-    points, off = np.empty((2 * s + 1, s)), np.empty(s)
+    curved = len(_CURVED)
+    aside = s - curved  # pairs of points that move with the middle
+    points, off = np.empty((1 + 2 * curved, s)), np.empty(s)
+    weight, weight_cov = np.empty(len(points)), np.empty(len(points))
+    weight[:], weight_cov[:] = of_mean[1], of_cov[1]
+    weight[0], weight_cov[0] = (
+        of_mean[0] + 2 * aside * of_mean[1],
+        of_cov[0] + 2 * aside * of_cov[1],
+    )
+    rest, column = np.empty((s, s)), np.empty(s)
     for t in range(n):
-        root = _root(spread * cov[t])
-        points[0] = mean[t]
-        for k in range(s):
+        for x in range(s):
+            points[0, x] = mean[t, x]
+            for y in range(s):
+                rest[x, y] = spread * cov[t, x, y]
+        for k in range(curved):
+            _split(rest, _CURVED[k], column)
             for x in range(s):
-                points[1 + k, x] = mean[t, x] + root[x, k]
-                points[1 + s + k, x] = mean[t, x] - root[x, k]
+                points[1 + k, x] = mean[t, x] + column[x]
+                points[1 + curved + k, x] = mean[t, x] - column[x]
+        for y in range(s):
+            rest[PZ, y] += dt * rest[VZ, y]
+        for x in range(s):
+            rest[x, PZ] += dt * rest[x, VZ]
         there, P = turned(points, dt, fade), to_cov[t]
-        for k in range(2 * s + 1):
+        for k in range(len(points)):
             for x in range(s):
-                to_mean[t, x] += of_mean[k] * there[k, x]
-        for k in range(2 * s + 1):
+                to_mean[t, x] += weight[k] * there[k, x]
+        for x in range(s):
+            for y in range(s):
+                P[x, y] = 2.0 * of_cov[1] * rest[x, y]
+        for k in range(len(points)):
             for x in range(s):
                 off[x] = there[k, x] - to_mean[t, x]
             for x in range(s):
-                part = of_cov[k] * off[x]
+                part = weight_cov[k] * off[x]
                 for y in range(s):
                     P[x, y] += part * off[y]
     return to_mean, to_cov
 
 
+_CURVED = (VX, VY, TURN)
+"""What turns, or turns other numbers: the motion is linear in all else."""
+
+
 @njit(cache=True, nogil=True)
-def _root(A: Array) -> Array:
-    """The lower Cholesky factor; a direction without variance has none in it either."""
+def _split(A: Array, k: int, column: Array) -> None:
+    """Takes one column of a root out of A, in place: A = column column^T + what is left, which has
+    nothing of number k. A direction without variance has none in it either.
+    """
     s = len(A)
-    L = np.zeros((s, s))
-    for k in range(s):
-        pivot = A[k, k]
-        for z in range(k):
-            pivot -= L[k, z] ** 2
-        if pivot > 0.0:
-            L[k, k] = np.sqrt(pivot)
-            for x in range(k + 1, s):
-                value = A[x, k]
-                for z in range(k):
-                    value -= L[x, z] * L[k, z]
-                L[x, k] = value / L[k, k]
-    return L
+    if A[k, k] > 0.0:
+        scale = 1.0 / np.sqrt(A[k, k])
+        for x in range(s):
+            column[x] = A[x, k] * scale
+        for x in range(s):
+            for y in range(s):
+                A[x, y] -= column[x] * column[y]
+    else:
+        column[:] = 0.0
+    A[k, :] = 0.0
+    A[:, k] = 0.0
 
 
 @njit(cache=True, nogil=True)

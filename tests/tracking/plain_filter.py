@@ -70,7 +70,10 @@ def unscented(
     mean: np.ndarray, cov: np.ndarray, dt: float, noise: Noise
 ) -> tuple[np.ndarray, np.ndarray]:
     """(n, 11), (n, 11, 11) of the turning model through sigma points."""
-    root = np.linalg.cholesky(STATE * cov)  # (n, 11, 11)
+    first = [VX, VY, TURN]  # the root begins with what turns
+    order = np.array(first + [k for k in range(STATE) if k not in first])
+    root = np.empty_like(cov)
+    root[:, order] = np.linalg.cholesky(STATE * cov[:, order][:, :, order])  # (n, 11, 11)
     columns = np.swapaxes(root, 1, 2)
     points = np.concatenate(
         [mean[:, None], mean[:, None] + columns, mean[:, None] - columns], axis=1
