@@ -15,6 +15,7 @@ from backend.spatial.boxes import Boxes, concatenated
 from backend.spatial.types import Array
 from backend.tracking.records import PX, PY, PZ, Detections
 from backend.tracking.tracker import Tracked, later, nothing, track
+from cockpit.bench_alarm import alarm_rows
 from cockpit.bench_rows import percentile_rows
 
 PLACES, SIGMA = (PX, PY, PZ), np.array([0.06, 0.06, 0.15])
@@ -33,6 +34,7 @@ def people_rows() -> list[BenchRow]:
         *rows,
         *percentile_rows("tracks and 1 s ahead, 20 people on 2 m²", crowd, 50.0),
         *_from_points(),
+        *alarm_rows(_WALLS),
     ]
 
 
