@@ -32,7 +32,6 @@ from backend.shell.sim.lidar import Lidar, Person, scan
 from backend.shell.sim.radio import Radio
 from backend.site.site import load_site
 from backend.spatial.boxes import Boxes, concatenated
-from backend.spatial.types import Array
 from cockpit.bench_rows import percentile_rows
 
 SECONDS = 20.0
@@ -103,7 +102,7 @@ def _simulated(walls: Boxes) -> Sent:
 def _people(t: float) -> tuple[Person, ...]:
     """One walks to the machine and away again, nine stand farther off."""
     far = 3.0 + 2.5 * np.cos(0.5 * t)
-    angles: Array = 2.4 * np.arange(1, 10)
+    angles = 2.4 * np.arange(1.0, 10.0)
     others = [Person((4.0 + k) * np.array([np.cos(a), np.sin(a)])) for k, a in enumerate(angles)]
     return (Person(np.array([0.8 + far, 0.0])), *others)
 
