@@ -18,18 +18,24 @@ from backend.cspace.margins import margins
 from backend.cspace.reach_image import reach_image
 from backend.cspace.regions import regions
 from backend.machine.load import load_machine, shipped_machines
+from backend.machine.model import Machine
 from backend.machine.outline import outlines_of
 from backend.perception.detect import detect
 from backend.perception.lzf_kernel import expanded, expanded_size
 from backend.pipeline.along_cycle import Cycle
 from backend.pipeline.along_track import Placement, Question, along_track
+from backend.pipeline.partner_risks import pieces
+from backend.pipeline.partner_risks_kernel import first_meeting
 from backend.pipeline.place import place
+from backend.pipeline.records import Body3D
 from backend.pipeline.watch import Cloud, Watched, watch
 from backend.planning.live import rehearse
 from backend.safety.approach import Motion, approach
 from backend.safety.limiter import Wish, limit, open_latch
 from backend.safety.limits import Delay
 from backend.safety.record import Concern, Level
+from backend.safety.swing_arcs import Objects, judge_swing
+from backend.safety.swing_risk import Boundaries, Swing
 from backend.site.named_bodies import SiteBodies
 from backend.spatial import rotation, transform
 from backend.spatial.boxes import Boxes
@@ -78,6 +84,7 @@ def compile_kernels() -> None:
         driving_zone(machine, q, base, near, 0.1)
         turning_zone(machine, q, base, near, eta=0.1)
     follow(near)
+    beside(machine, body)
 
 
 def follow(machine: Boxes) -> None:
@@ -92,6 +99,17 @@ def follow(machine: Boxes) -> None:
         tracks = tracker.track(tracks, Detections(0.1 * k, np.zeros((1, 7)))).tracks
     tracker.later(tracks, 1.0)
     associate(np.ones((2, 2)))
+
+
+def beside(machine: Machine, body: Body3D) -> None:
+    """Machines and people on the TTC-x plane."""
+    poses = np.repeat(body.link_poses[None], 2, axis=0)
+    seen, _ = pieces(machine, poses, np.eye(4), np.arange(len(machine.body_links)))
+    some = seen.take(np.ones(seen.radius.shape[1], dtype=bool))
+    first_meeting(tuple(seen), tuple(some), 0.1, 0.3)
+    still = Swing(0.0, 0.0, 0.0, 1.0, 1.0)
+    one = Objects(np.ones((1, 2)), np.zeros((1, 2)), *np.ones((4, 1)))
+    judge_swing(body.boxes.corners(), still, one, one, 1.0, Boundaries(), 0.2)
 
 
 _GROUND: Array = np.stack(

@@ -81,6 +81,20 @@ class RiskModel(BaseModel):
     )
 
 
+class PartnerRiskModel(BaseModel):
+    """What the swing of one machine is to another machine."""
+
+    machine: str
+    other: str
+    body: str = Field(description="that is soonest, machine:part/number; empty without")
+    other_body: str = Field(description="whom it meets, machine:part/number; empty without")
+    ttc: float | None = Field(ge=0.0, description=f"the least now: {TTC}")
+    index: float | None = Field(ge=LEAST_INDEX, description=f"the least now: {INDEX}")
+    ttc_ahead: float | None = Field(ge=0.0, description=f"the least in a second: {TTC}")
+    index_ahead: float | None = Field(ge=LEAST_INDEX, description=f"the least in a second: {INDEX}")
+    level: LevelModel
+
+
 class PeopleModel(BaseModel):
     """People and objects that LiDARs see. A track near a machine never goes without a word."""
 
@@ -90,6 +104,9 @@ class PeopleModel(BaseModel):
     tracks: list[TrackModel]
     lost: list[LostModel] = Field(description='"last seen here"')
     risks: list[RiskModel] = Field(description="by track and machine; empty while unknown")
+    machines: list[PartnerRiskModel] = Field(
+        default_factory=list, description="machines against machines; empty while unknown"
+    )
 
 
 def index_number(x: float) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from backend.documents.people import index_number, ttc_number
-from backend.pipeline.people_records import Judged, People, Tracked
+from backend.pipeline.people_records import Judged, PartnerRisk, People, Tracked
 from backend.safety.swing_risk import Risk
 from backend.tracking.records import Status
 
@@ -41,6 +41,9 @@ def people_document(people: People, now: float) -> dict[str, Any]:
             for machine, judged in people.judged.items()
             for k in range(len(judged.distance))
         ],
+        "machines": [
+            _partner(risk) for judged in people.judged.values() for risk in judged.partners
+        ],
     }
 
 
@@ -56,6 +59,20 @@ def _track(tracked: Tracked, k: int) -> dict[str, Any]:
         "sigma": float(tracked.sigma[k]),
         "unseen": float(tracked.unseen[k]),
         "ahead": {"position": tracked.ahead[k].tolist(), "cov": tracked.ahead_cov[k].tolist()},
+    }
+
+
+def _partner(risk: PartnerRisk) -> dict[str, Any]:
+    return {
+        "machine": risk.machine,
+        "other": risk.other,
+        "body": risk.body,
+        "other_body": risk.other_body,
+        "ttc": ttc_number(risk.ttc),
+        "index": index_number(risk.index),
+        "ttc_ahead": ttc_number(risk.ttc_ahead),
+        "index_ahead": index_number(risk.index_ahead),
+        "level": Risk(risk.level).name,
     }
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -14,6 +15,7 @@ from backend.fusion.pose import Validity
 from backend.machine.model import Machine
 from backend.pipeline.braking import LONGEST_DELAY, age_of, motion_of
 from backend.pipeline.config import Config
+from backend.pipeline.partner_risks import partner_risks
 from backend.pipeline.people import PeopleState, boxes_of, counts, largest, lost_boxes, name_of
 from backend.pipeline.people_records import Judged, People
 from backend.pipeline.records import MachineState
@@ -35,7 +37,7 @@ HORIZON = 1.0
 
 def people_concern(
     own: str,
-    state: MachineState,
+    machines: Mapping[str, MachineState],
     present: People,
     memory: PeopleState,
     now: float,
@@ -49,7 +51,7 @@ def people_concern(
     """
     watch = config.people
     assert watch is not None
-    machine = config.machines[own]
+    machine, state = config.machines[own], machines[own]
     joints = len(machine.joints)
     if state.pose.validity is not Validity.VALID or state.body is None:
         reason = state.pose.reasons[0] if state.pose.reasons else "is unknown"
@@ -58,7 +60,11 @@ def people_concern(
         return judging.unknown(own, joints, f"people: {present.reason}", now), None
     judged = memory.judged.get(own)
     if judged is None:
-        judged = _judged(own, machine, state, present, memory, watch)
+        swing = _swing(own, machine, state, memory)
+        judged = replace(
+            _judged(own, machine, state, present, swing, watch),
+            partners=partner_risks(own, machines, swing, HORIZON, watch, config),
+        )
     boxes, names, velocity, least, picked = _around(present, watch, now)
     risks = _picked(judged.risks, picked)
     doubt = spread(machine, state.pose)
@@ -137,7 +143,7 @@ def _judged(
     machine: Machine,
     state: MachineState,
     present: People,
-    memory: PeopleState,
+    swing: Swing,
     watch: Watch,
 ) -> Judged:
     """Everybody, tentative tracks too, against all bodies of one machine."""
@@ -162,7 +168,7 @@ def _judged(
     ahead = now._replace(place=placed[:, :2], sigma=np.minimum(vague, 1.0))
     risks = judge_swing(
         corners,
-        _swing(own, machine, state, memory),
+        swing,
         now,
         ahead,
         HORIZON,

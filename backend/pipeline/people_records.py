@@ -101,14 +101,35 @@ NOBODY = Tracked(
 
 
 @dataclass(frozen=True)
+class PartnerRisk:
+    """What the swing of `machine` is to the machine `other`. body: own body that is soonest, and
+    other_body whom it meets, empty when nothing swings that far; ttc, index: the least now,
+    ttc_ahead, index_ahead: in a second [s, -]; level: `Risk`, the worst; left: (negative, positive)
+    what is left of the swing's speed.
+    """
+
+    machine: str
+    other: str
+    body: str
+    other_body: str
+    ttc: float
+    index: float
+    ttc_ahead: float
+    index_ahead: float
+    level: int
+    left: tuple[float, float] = (1.0, 1.0)
+
+
+@dataclass(frozen=True)
 class Judged:
     """One machine's view of everybody. distance: (k,) to the nearest body [m]; nearest: (k,) that
-    body; risks: of its swing.
+    body; risks: of its swing; partners: the same of the other machines.
     """
 
     distance: Array
     nearest: tuple[str, ...]
     risks: Risks
+    partners: tuple[PartnerRisk, ...] = ()
 
 
 @dataclass(frozen=True)

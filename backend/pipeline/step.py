@@ -20,6 +20,7 @@ from backend.fusion.streams import Streams, ingest
 from backend.pipeline.braking import approach_of, unknown_ages
 from backend.pipeline.config import Config
 from backend.pipeline.margins import machine_margins
+from backend.pipeline.partner_risks import swinging
 from backend.pipeline.people import PeopleState, present
 from backend.pipeline.people import following as people_after
 from backend.pipeline.people_concern import people_concern
@@ -90,7 +91,12 @@ def step(state: State, inputs: Inputs, now: float, config: Config) -> tuple[Stat
         else {}
     )
     concerns = tuple(
-        _partner(name, machines, close, unknown, now, config, name in driven) for name in config.own
+        swinging(
+            _partner(name, machines, close, unknown, now, config, name in driven),
+            () if people is None or name not in people.judged else people.judged[name].partners,
+            pairs,
+        )
+        for name in config.own
     )
     for name in config.own:
         around = site_of(name, gauge, config)
@@ -191,9 +197,7 @@ def _people(
     concerns: list[Concern] = []
     judged: dict[str, Judged] = {}
     for name in config.own:
-        concern, why = people_concern(
-            name, machines[name], here, memory, now, config, name in driven
-        )
+        concern, why = people_concern(name, machines, here, memory, now, config, name in driven)
         concerns.append(concern)
         if why is not None:
             judged[name] = why

@@ -14,13 +14,12 @@ import numpy as np
 from backend.safety import site
 from backend.safety.approach import Approach
 from backend.safety.partner import Limits
-from backend.safety.record import Concern, Level
+from backend.safety.record import Concern
+from backend.safety.swing_limit import fractions, swing_limited
 from backend.safety.swing_risk import Boundaries, Risk
 from backend.spatial.types import Array, IntArray
 
 NAME = "people"
-WARNED = 0.4
-"""Share of full speed that a warning leaves the swing towards somebody."""
 
 
 @dataclass(frozen=True)
@@ -77,17 +76,12 @@ def judge(
     found = site.judge(machine, joints, rows, names, watch.limits, now, approach, NAME)
     if not len(risks.level) or risks.level.max() == Risk.SAFE:
         return found
-    allowed, level = found.allowed.copy(), found.level
-    for k in np.flatnonzero(risks.level > Risk.SAFE):
-        stopped = risks.level[k] == Risk.EMERGENCY
-        side = int(risks.side[k])
-        allowed[0, side] = min(allowed[0, side], 0.0 if stopped else WARNED)
-        level = max(level, Level.STOP if stopped else Level.SLOW)
-    reason = found.reason
+    left = fractions(risks.level, risks.side)
+    limited = swing_limited(found, left, int(risks.level.max()))
     worst = int(np.lexsort((risks.ttc, -risks.level))[0])
-    if level > found.level or not len(rows.margin):
-        reason = _words(risks, worst, names)
-    return replace(found, level=level, reason=reason, allowed=allowed)
+    if limited.level > found.level or not len(rows.margin):
+        return replace(limited, reason=_words(risks, worst, names))
+    return limited
 
 
 def unknown(machine: str, joints: int, reason: str, now: float) -> Concern:

@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from backend.safety.people import Risks
+from backend.safety.swing_arcs_kernel import gaps
 from backend.safety.swing_risk import Boundaries, Swing, reached, risk, speeding
-from backend.spatial.angles import wrap
 from backend.spatial.types import Array, IntArray
 
 SAMPLES = 7  # of an edge
@@ -83,24 +83,25 @@ def _judged(
 ) -> tuple[Array, Array, IntArray]:
     """(b, k) time to collision, (b, k) warning index, (k,) side that comes nearer."""
     far = np.maximum(np.linalg.norm(objects.place, axis=1), 1e-6)
-    at, angle = np.maximum(points[0], 1e-6)[:, :, None], points[1][:, :, None]
-    reach = (objects.radius + objects.sigma + _spacing(corners)[:, None])[:, None, :]
-    low, high = corners[:, :, 2].min(axis=1), corners[:, :, 2].max(axis=1)
-    passes = (low[:, None] < objects.high + HEADROOM) & (high[:, None] > objects.low - HEADROOM)
-    ring = (np.abs(at - far) <= reach) & passes[:, None, :]
-    # Half the angle within which a sample is nearer than `reach` to the object: law of cosines.
-    wide = np.arccos(np.clip((at**2 + far**2 - reach**2) / (2.0 * at * far), -1.0, 1.0))
     place = np.arctan2(objects.place[:, 1], objects.place[:, 0])
-    delta = place - (angle + turned)
     x, y = objects.place.T
     turning = (x * objects.velocity[:, 1] - y * objects.velocity[:, 0]) / far**2
-    gaps = [
-        np.where(ring, np.mod(side * delta, 2.0 * np.pi) - wide, np.inf).min(axis=1, initial=np.inf)
-        for side in (-1.0, 1.0)
-    ]
-    nearest = np.where(ring, np.abs(wrap(delta)) - wide, np.inf).min(axis=1, initial=np.inf)
+    low, high = corners[:, :, 2].min(axis=1), corners[:, :, 2].max(axis=1)
+    reach = objects.radius + objects.sigma
+    about = far, place, reach, objects.low, objects.high
+    back, on, nearest = gaps(
+        np.maximum(points[0], 1e-6),
+        points[1],
+        low,
+        high,
+        _spacing(corners),
+        tuple(np.ascontiguousarray(values, dtype=float) for values in about),
+        turned,
+        HEADROOM,
+    )
+    both = back, on
     ttc = np.full(nearest.shape, np.inf)
-    for sign, gap in zip((-1.0, 1.0), gaps, strict=True):
+    for sign, gap in zip((-1.0, 1.0), both, strict=True):
         safe = np.where(np.isfinite(gap), gap, 1e9)
         w = np.broadcast_to(sign * (swing.rate - turning), safe.shape)
         found = reached(safe, w, sign * swing.acceleration, speeding(swing))
@@ -108,7 +109,7 @@ def _judged(
     ttc = np.where(nearest <= 0.0, 0.0, ttc)
     # Braking distances left in the direction of the motion; both directions at rest.
     if abs(swing.rate) > 0.02:
-        left = gaps[1] if swing.rate > 0.0 else gaps[0]
+        left = on if swing.rate > 0.0 else back
         left = np.where(nearest <= 0.0, nearest, left)
     else:
         left = nearest
@@ -119,9 +120,7 @@ def _judged(
     index = np.where(np.isfinite(left), index, np.inf)
     if not swing.known:
         ttc, index = np.zeros_like(ttc), np.full_like(index, -np.inf)
-    side = np.where(
-        gaps[1].min(axis=0, initial=np.inf) <= gaps[0].min(axis=0, initial=np.inf), 1, 0
-    )
+    side = np.where(on.min(axis=0, initial=np.inf) <= back.min(axis=0, initial=np.inf), 1, 0)
     return ttc, index, side.astype(np.int64)
 
 

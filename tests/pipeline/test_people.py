@@ -58,13 +58,14 @@ def run(
     scans: int = 100,
     driven: tuple[str, ...] = (),
     status: Status = Status.CONFIRMED,
+    position: tuple[float, float] = FAR,
 ) -> Snapshot:
-    """Machine a at the origin, b far away, scans every 0.1 s until `scans` were seen."""
+    """Machine a at the origin, b at `position`, scans every 0.1 s until `scans` were seen."""
     here, state = replace(config, people=Watch()), initial(config)
     for k in range(cycles):
         now = 100.0 + 0.02 * k
         scan = seen(now - 0.1, *people, status=status) if k % 5 == 0 and k // 5 < scans else None
-        one = replace(inputs(here, now, b_position=FAR), people=scan, driven=driven)
+        one = replace(inputs(here, now, b_position=position), people=scan, driven=driven)
         state, snapshot = step(state, one, now, here)
     return snapshot
 

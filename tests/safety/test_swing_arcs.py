@@ -117,3 +117,15 @@ def test_without_swinging_bodies_or_people_nothing_is_judged() -> None:
     empty = Objects(np.zeros((0, 2)), np.zeros((0, 2)), *(np.zeros(0),) * 4)
     boxes = Boxes(np.array([[3.0, 0.0, 1.0]]), np.eye(3)[None], np.array([[0.5, 0.2, 0.5]]))
     assert len(judged(boxes, swing, empty).level) == 0
+
+
+@pytest.mark.parametrize("number", [np.nan, np.inf, 1e300])
+def test_what_is_no_place_is_an_emergency(number: float) -> None:
+    b = box(np.random.default_rng(0))
+    swing = Swing(0.0, 0.0, 0.0, 1.0, 1.0)
+    far_away = one(np.array([100.0, 0.0]), np.zeros(2), 0.3)
+    assert judged(b, swing, far_away).level[0] == Risk.SAFE
+    strange = far_away._replace(place=np.array([[number, 0.0]]))
+    assert judged(b, swing, strange).level[0] == Risk.EMERGENCY
+    strange = far_away._replace(sigma=np.array([number]))
+    assert judged(b, swing, strange).level[0] == Risk.EMERGENCY

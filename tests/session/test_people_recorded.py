@@ -12,7 +12,15 @@ import pytest
 from backend.documents.people_document import people_document
 from backend.machine.load import load_machine
 from backend.pipeline.config import Config
-from backend.pipeline.people_records import Judged, Missing, People, Seen, Sensor, Tracked
+from backend.pipeline.people_records import (
+    Judged,
+    Missing,
+    PartnerRisk,
+    People,
+    Seen,
+    Sensor,
+    Tracked,
+)
 from backend.safety.partner import Limits
 from backend.safety.people import Risks
 from backend.shell.app.wire import dumps
@@ -87,18 +95,25 @@ def test_what_was_shown_comes_back() -> None:
         np.array([3, 7]), np.array([1.0, np.inf]), np.array([-np.inf, 2.0]), np.array([0.5, 0.25]),
         np.array([4.0, np.inf]), np.array([2, 0]), np.zeros(k, np.int64),
     )  # fmt: skip
+    partner = PartnerRisk(
+        "left", "right", "left:boom/0", "right:stick/1", 1.5, -np.inf, np.inf, 2.0, 2
+    )
     people = People(
         "",
         0.125,
         (Sensor("left", "lidar", 99.5, (0.0, 0.5, 2.0), 123),),
         tracked,
         (Missing(9, (1.0, 2.0, 0.5), 90.0, 93.0),),
-        {"left": Judged(np.array([0.5, 3.0]), bodies, risks)},
+        {"left": Judged(np.array([0.5, 3.0]), bodies, risks, (partner,))},
     )
     document = people_document(people, 100.0)
     again = recorded_people(json.loads(dumps(document)), 100.0, config)
     assert again is not None
     assert people_document(again, 100.0) == document
+    del document["machines"]  # as recorded before machines were judged
+    before = recorded_people(json.loads(dumps(document)), 100.0, config)
+    assert before is not None
+    assert people_document(before, 100.0)["machines"] == []
     assert recorded_people(None, 100.0, config) is None
     unknown = replace(people, reason="no LiDAR data for 0.9 s", age=float("nan"))
     back = recorded_people(json.loads(dumps(people_document(unknown, 100.0))), 100.0, config)

@@ -10,7 +10,14 @@ import numpy as np
 
 from backend.documents.people import LEAST_INDEX
 from backend.pipeline.config import Config
-from backend.pipeline.people_records import Judged, Missing, People, Sensor, Tracked
+from backend.pipeline.people_records import (
+    Judged,
+    Missing,
+    PartnerRisk,
+    People,
+    Sensor,
+    Tracked,
+)
 from backend.safety.people import Risks
 from backend.safety.swing_risk import Risk
 from backend.spatial.types import Array
@@ -26,6 +33,7 @@ def recorded_people(document: Document | None, now: float, config: Config) -> Pe
     if document is None:
         return None
     tracks = list(document["tracks"])
+    partners = list(document.get("machines", ()))  # older recordings have none
     return People(
         str(document["reason"]),
         _number(document["age"], math.nan),
@@ -50,9 +58,9 @@ def recorded_people(document: Document | None, now: float, config: Config) -> Pe
             for one in document["lost"]
         ),
         {
-            name: _judged(name, document["risks"], config)
+            name: _judged(name, document["risks"], partners, config)
             for name in config.own
-            if any(one["machine"] == name for one in document["risks"])
+            if any(one["machine"] == name for one in (*document["risks"], *partners))
         },
     )
 
@@ -84,7 +92,7 @@ def _tracked(tracks: list[Document]) -> Tracked:
     )
 
 
-def _judged(name: str, risks: list[Document], config: Config) -> Judged:
+def _judged(name: str, risks: list[Document], partners: list[Document], config: Config) -> Judged:
     own = [one for one in risks if one["machine"] == name]
     bodies = {f"{name}:{body}": k for k, body in enumerate(config.machines[name].body_names)}
     columns = {
@@ -104,6 +112,21 @@ def _judged(name: str, risks: list[Document], config: Config) -> Judged:
             np.array([Risk[str(one["level"])] for one in own], dtype=np.int64),
             np.zeros(len(own), dtype=np.int64),
         ),
+        tuple(_partner(one) for one in partners if one["machine"] == name),
+    )
+
+
+def _partner(one: Document) -> PartnerRisk:
+    return PartnerRisk(
+        str(one["machine"]),
+        str(one["other"]),
+        str(one["body"]),
+        str(one["other_body"]),
+        _number(one["ttc"], math.inf),
+        _number(one["index"], math.inf),
+        _number(one["ttc_ahead"], math.inf),
+        _number(one["index_ahead"], math.inf),
+        int(Risk[str(one["level"])]),
     )
 
 

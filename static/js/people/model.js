@@ -43,6 +43,9 @@ export function risks(id, machine = null) {
   return found.sort((a, b) => RANK[b.level] - RANK[a.level] || infinite(a.distance) - infinite(b.distance));
 }
 
+/** What the swing of a machine is to the other machines; nothing while people are unknown. */
+export const partners = (machine) => (unknown() ? [] : (people()?.machines ?? []).filter((r) => r.machine === machine).map(read));
+
 export const level = (id) => risks(id)[0]?.level ?? "SAFE";
 
 /** The worst level of anybody. */

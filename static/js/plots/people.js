@@ -9,7 +9,7 @@ import { COLOUR, ORDER, mark, overlap, riskLine, times } from "./plan_people.js"
 import { $, write } from "../words.js";
 import { label as nameOf, machine, state } from "../state.js";
 import { ageText } from "../head.js";
-import { AHEAD, BOUNDARIES, PAST, age, code, history, people, region, risks, tracks, unknown } from "../people/model.js";
+import { AHEAD, BOUNDARIES, PAST, age, code, history, partners, people, region, risks, tracks, unknown } from "../people/model.js";
 
 const HALVES = [5, 10, 20, 40, 80, 160]; // of the shown piece of ground [m]
 const TTC = 6; // at which the plane ends [s]
@@ -123,10 +123,15 @@ function plane(g, place, dpr) {
     return [];
   }
   const at = (ttc, index) => [clamp(x(clamp(ttc, 0, TTC)), box.left + 5, box.right - 5), clamp(y(clamp(index, ...INDEX)), box.top + 5, box.bottom - 5)];
-  const spots = tracks().flatMap((track) => risks(track.id, state.own).map((r) => ({ track, risk: r, now: at(r.ttc, r.index), later: at(r.ttc_ahead, r.index_ahead) })));
-  for (const { now, later } of spots) segment(g, ...now, ...later, rgba(C.people, 0.55), 1.2, [4, 3]);
+  const spot = (name, r, shape) => ({ name, risk: r, shape, now: at(r.ttc, r.index), later: at(r.ttc_ahead, r.index_ahead) });
+  const spots = [
+    ...tracks().flatMap((track) => risks(track.id, state.own).map((r) => spot(code(track), r, ring))),
+    ...partners(state.own).map((r) => spot(nameOf(r.other), r, square)),
+  ];
+  const inkOf = ({ shape }) => (shape === square ? C.partner : C.people);
+  for (const one of spots) segment(g, ...one.now, ...one.later, rgba(inkOf(one), 0.55), 1.2, [4, 3]);
   for (const { later } of spots) times(g, ...later, 4.5);
-  for (const { now } of spots) ring(g, ...now);
+  for (const { now, shape } of spots) shape(g, ...now);
   // Marks in one place, above all in the far corner, share a label; in a crowd the worst keep theirs.
   spots.sort((a, b) => ORDER.indexOf(a.risk.level) - ORDER.indexOf(b.risk.level) || a.risk.ttc_ahead - b.risk.ttc_ahead || 0);
   const groups = [];
@@ -138,7 +143,7 @@ function plane(g, place, dpr) {
   const taken = [];
   for (const { place: [px, py], spots: list } of groups) {
     const right = px > (box.left + box.right) / 2;
-    const text = list.length > 3 ? `${list.slice(0, 2).map((s) => code(s.track)).join(" ")} +${list.length - 2}` : list.map((s) => code(s.track)).join(" ");
+    const text = list.length > 3 ? `${list.slice(0, 2).map((s) => s.name).join(" ")} +${list.length - 2}` : list.map((s) => s.name).join(" ");
     g.font = font("tick", 700);
     const w = g.measureText(text).width, left = right ? px - 9 - w : px + 9, middle = clamp(py, box.top + 0.6 * t, box.bottom - 0.6 * t);
     const place = { left, right: left + w, top: middle - 0.5 * t, bottom: middle + 0.5 * t };
@@ -147,18 +152,21 @@ function plane(g, place, dpr) {
     label(g, text, right ? px - 9 : px + 9, middle, { align: right ? "right" : "left", base: "middle", halo: true, weight: 700, colour: C.text });
   }
   charts.push({ ...chart, kind: "plane", spots });
-  return spots.map(({ track, risk: r }) => ({ code: code(track), level: r.level, ttc: r.ttc, index: r.index, ttc_ahead: r.ttc_ahead, index_ahead: r.index_ahead, now: region(r.ttc, r.index), later: region(r.ttc_ahead, r.index_ahead) }));
+  return spots.map(({ name, risk: r }) => ({ code: name, level: r.level, ttc: r.ttc, index: r.index, ttc_ahead: r.ttc_ahead, index_ahead: r.index_ahead, now: region(r.ttc, r.index), later: region(r.ttc_ahead, r.index_ahead) }));
 }
 
-function ring(g, x, y) {
-  for (const [width, style] of [[5, C.halo], [2.2, C.people]]) {
+function outlined(g, colour, path) {
+  for (const [width, style] of [[5, C.halo], [2.2, colour]]) {
     g.beginPath();
-    g.arc(x, y, 5, 0, 2 * Math.PI);
+    path();
     g.lineWidth = width;
     g.strokeStyle = style;
     g.stroke();
   }
 }
+
+const ring = (g, x, y) => outlined(g, C.people, () => g.arc(x, y, 5, 0, 2 * Math.PI));
+const square = (g, x, y) => outlined(g, C.partner, () => g.rect(x - 4.5, y - 4.5, 9, 9));
 
 export function paint(g, width, height, dpr) {
   clear(g, width, height);
@@ -180,6 +188,7 @@ export function paint(g, width, height, dpr) {
     [swatches.glyph((c, x, y) => ring(c, x, y)), "now"],
     [swatches.glyph((c, x, y) => times(c, x, y, 4.5)), "in 1 s"],
     [swatches.line(C.second), "object"],
+    [swatches.glyph((c, x, y) => square(c, x, y)), "machine"],
   ]);
   const worst = seen.filter(({ level }) => level !== "SAFE").map((s) => `${s.code} ${s.level}`);
   return {
@@ -197,7 +206,7 @@ export function probe(px, py) {
   if (!hit) return null;
   if (hit.kind === "plane") {
     const near = hit.spots.filter(({ now, later }) => [now, later].some(([u, v]) => Math.hypot(u - px, v - py) < 10));
-    if (near.length) return near.slice(0, 3).flatMap(({ track, risk: r }) => [code(track), ...riskLine(r)]);
+    if (near.length) return near.slice(0, 3).flatMap(({ name, risk: r }) => [name, ...riskLine(r)]);
     const ttc = hit.x.inverse(px), index = hit.y.inverse(py);
     return [`TTC ${number(ttc, 1)} s, x ${number(index, 1)}: ${region(ttc, index)}`, "○ now, × in 1 s; the lower of the two counts"];
   }

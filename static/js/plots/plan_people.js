@@ -184,7 +184,7 @@ export function riskLine(r) {
   const ttc = (v) => `TTC ${limited(v, 99)}${Number.isFinite(v) ? " s" : ""}`;
   const index = (v) => `x ${Number.isFinite(v) ? (v < -9 ? "below −9" : limited(v, 99)) : "no braking"}`;
   const where = r.body ? ` ${partName(r.body)}` : "";
-  return [`${r.level} · ${nameOf(r.machine)}${where} ${metres(r.distance)}`, `  now ${ttc(r.ttc)}, ${index(r.index)}; in 1 s ${ttc(r.ttc_ahead)}, ${index(r.index_ahead)}`];
+  return [`${r.level} · ${nameOf(r.machine)}${where}${r.distance === undefined ? "" : ` ${metres(r.distance)}`}`, `  now ${ttc(r.ttc)}, ${index(r.index)}; in 1 s ${ttc(r.ttc_ahead)}, ${index(r.index_ahead)}`];
 }
 
 const STATUS = { confirmed: "seen", coasting: "not seen now, foretold", tentative: "perhaps" };
