@@ -37,8 +37,8 @@ HORIZON = 1.0
 
 @dataclass(frozen=True)
 class Cloud:
-    """One turn of one LiDAR. time: by the local clock [s]; points: (n, 3) in the sensor's frame
-    [m]; T_site_sensor: (4, 4) at that time; machines: all machines' bodies at that time.
+    """A turn of a LiDAR, or a part of one. time: by the local clock [s]; points: (n, 3) in the
+    sensor's frame [m]; T_site_sensor: (4, 4) at that time; machines: all machines' bodies then.
     """
 
     machine: str
@@ -68,7 +68,7 @@ def watch(
     """
     settings = detecting or Detecting()
     time = max(max(cloud.time for cloud in clouds), before.tracks.time)
-    kept, origins, sensors = [], [], []
+    kept, origins = [], []
     for cloud in clouds:
         R, origin = cloud.T_site_sensor[:3, :3], cloud.T_site_sensor[:3, 3]
         points = np.asarray(cloud.points, dtype=float)
@@ -77,10 +77,6 @@ def watch(
         points = points[~within(points, cloud.machines, settings)]
         kept.append(points)
         origins.append(np.broadcast_to(origin, points.shape))
-        x, y, z = origin.tolist()
-        sensors.append(
-            Sensor(cloud.machine, cloud.sensor, cloud.time, (x, y, z), len(cloud.points))
-        )
     merged, origin = np.concatenate(kept), np.concatenate(origins)
     objects = detect(merged, origin, NO_BOXES, settings).objects
     values = np.column_stack([objects.center, objects.yaw, objects.size])
@@ -88,8 +84,19 @@ def watch(
         before.tracks, Detections(time, values, MEASURED, NOISE), before.next_id, tracking
     )
     return Watched(found.tracks, found.next_id), _seen(
-        found.tracks, time, tuple(sensors), found.lost
+        found.tracks, time, _sensors(clouds), found.lost
     )
+
+
+def _sensors(clouds: tuple[Cloud, ...]) -> tuple[Sensor, ...]:
+    """Each LiDAR where it was last, with all points: a turn comes in one cloud or in several."""
+    newest: dict[tuple[str, str], Sensor] = {}
+    for cloud in sorted(clouds, key=lambda cloud: cloud.time):
+        key = cloud.machine, cloud.sensor
+        before = newest[key].points if key in newest else 0
+        x, y, z = cloud.T_site_sensor[:3, 3].tolist()
+        newest[key] = Sensor(*key, cloud.time, (x, y, z), before + len(cloud.points))
+    return tuple(newest.values())
 
 
 def _seen(tracks: Tracks, time: float, sensors: tuple[Sensor, ...], lost: tuple[Lost, ...]) -> Seen:

@@ -82,10 +82,11 @@ def _judged(
     uncertainty: float,
 ) -> tuple[Array, Array, IntArray]:
     """(b, k) time to collision, (b, k) warning index, (k,) side that comes nearer."""
-    far = np.maximum(np.linalg.norm(objects.place, axis=1), 1e-6)
+    far = np.maximum(np.hypot(*objects.place.T), 1e-6)
     place = np.arctan2(objects.place[:, 1], objects.place[:, 0])
     x, y = objects.place.T
-    turning = (x * objects.velocity[:, 1] - y * objects.velocity[:, 0]) / far**2
+    with np.errstate(over="ignore", invalid="ignore"):  # of what is no place
+        turning = (x * objects.velocity[:, 1] - y * objects.velocity[:, 0]) / far**2
     low, high = corners[:, :, 2].min(axis=1), corners[:, :, 2].max(axis=1)
     reach = objects.radius + objects.sigma
     about = far, place, reach, objects.low, objects.high

@@ -10,12 +10,14 @@ from collections import deque
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 
+import numpy as np
+
 from backend.machine.lidars import sensor_pose
 from backend.machine.model import Machine
 from backend.pipeline.config import Config
 from backend.pipeline.people_records import Seen
 from backend.pipeline.place import between
-from backend.pipeline.records import MachineState, Notice, Snapshot
+from backend.pipeline.records import Body3D, MachineState, Notice, Snapshot
 from backend.pipeline.watch import Cloud, Watched, watch
 from backend.shell.aside import Aside, WorkerGone
 from backend.shell.image_loops import Stopwatch, ticks
@@ -24,6 +26,7 @@ from backend.shell.link.cloud import decode_cloud
 from backend.shell.link.codec import DecodeError
 from backend.shell.link.receiver import Heard
 from backend.spatial.boxes import concatenated
+from backend.spatial.types import AnyArray
 
 log = logging.getLogger(__name__)
 
@@ -35,6 +38,9 @@ KEPT = 1.0
 """Poses of the last moments that clouds are placed by [s]."""
 OLDEST = 0.5
 """Older clouds are not worth looking at [s]."""
+PART = 0.025
+"""Points of one turn that are this near in time are placed by one pose [s]."""
+MOST_PARTS = 8
 
 
 Question = tuple[int, tuple[Cloud, ...]]
@@ -177,8 +183,8 @@ class PeopleLoop:
             if found == "wait" and now - cloud.arrival < 2.0 * GATHER:
                 continue
             del self._waiting[key]
-            if isinstance(found, Cloud):
-                placed.append(found)
+            if isinstance(found, tuple):
+                placed += found
         return tuple(placed)
 
 
@@ -186,9 +192,9 @@ def placed_cloud(
     cloud: HeardCloud,
     poses: tuple[tuple[float, dict[str, MachineState]], ...],
     machines: dict[str, Machine],
-) -> Cloud | str:
-    """The cloud with the poses of its own moment; "wait" while these are not there yet, and else
-    why it cannot be used.
+) -> tuple[Cloud, ...] | str:
+    """The cloud with the poses of its own moment, in parts where its points tell their times;
+    "wait" while these poses are not there yet, and else why it cannot be used.
     """
     if not poses or cloud.machine not in machines:
         return "no poses"
@@ -196,21 +202,50 @@ def placed_cloud(
     if mount is None:
         return f"{cloud.machine} has no LiDAR called {cloud.sensor!r}"
     offset = poses[-1][1][cloud.machine].pose.clock_offset
-    at = cloud.arrival if offset is None else cloud.stamp + 0.5 * (offset[0] + offset[1])
-    if not math.isfinite(at):
+    stamp = cloud.arrival if offset is None else cloud.stamp + 0.5 * (offset[0] + offset[1])
+    if not math.isfinite(stamp):
         return "no time"
-    if poses[-1][0] < at:
+    parts = _parts(cloud)
+    if poses[-1][0] < stamp + max(since for since, _ in parts):
         return "wait"
+    placed = []
+    for since, points in parts:
+        at = stamp + since
+        bodies = _bodies(poses, machines, at)
+        own = bodies.get(cloud.machine)
+        if own is None:
+            return f"{cloud.machine} is not placed"
+        T = sensor_pose(machines[cloud.machine], mount, own.link_poses)
+        boxes = concatenated([body.boxes for body in bodies.values()])
+        placed.append(Cloud(cloud.machine, cloud.sensor, at, points, T, boxes))
+    return tuple(placed)
+
+
+def _parts(cloud: HeardCloud) -> list[tuple[float, AnyArray]]:
+    """Points of about one time each, and that time since the cloud's stamp [s]: while a turn lasts
+    the machine moves on.
+    """
+    if cloud.times is None or not len(cloud.times):
+        return [(0.0, cloud.points)]
+    first, last = float(cloud.times.min()), float(cloud.times.max())
+    count = min(max(math.ceil((last - first) / PART), 1), MOST_PARTS)
+    which = np.minimum(
+        (count * (cloud.times - first) / max(last - first, 1e-9)).astype(int), count - 1
+    )
+    members = (which == k for k in range(count))
+    return [(float(cloud.times[part].mean()), cloud.points[part]) for part in members if part.any()]
+
+
+def _bodies(
+    poses: tuple[tuple[float, dict[str, MachineState]], ...],
+    machines: dict[str, Machine],
+    at: float,
+) -> dict[str, Body3D]:
+    """All machines that are placed, where they were at a time [s]."""
     k = next((k for k in range(len(poses) - 1, -1, -1) if poses[k][0] <= at), 0)
     before, after = poses[k][1], poses[min(k + 1, len(poses) - 1)][1]
-    bodies = {
+    return {
         name: between(machine, before[name].pose, after[name].pose, at)
         for name, machine in machines.items()
         if before[name].body is not None and after[name].body is not None
     }
-    own = bodies.get(cloud.machine)
-    if own is None:
-        return f"{cloud.machine} is not placed"
-    T = sensor_pose(machines[cloud.machine], mount, own.link_poses)
-    boxes = concatenated([body.boxes for body in bodies.values()])
-    return Cloud(cloud.machine, cloud.sensor, at, cloud.points, T, boxes)

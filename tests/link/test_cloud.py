@@ -213,3 +213,61 @@ def test_broken_clouds_do_no_harm() -> None:
 def test_noise_is_no_cloud(noise: bytes) -> None:
     with pytest.raises(DecodeError):
         decode_cloud(b"\x00\x01\x00\x00" + noise, "left", 0.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "values"),
+    [
+        ("time", 7, [-0.1, -0.05, 0.0]),
+        ("time", 8, [0.0, 0.05, 0.1]),
+        ("t", 6, [0, 50_000_000, 100_000_000]),
+        ("offset_time", 6, [0, 50_000_000, 100_000_000]),
+        ("timestamp", 8, [1_700_000_000.15, 1_700_000_000.2, 1_700_000_000.25]),
+    ],
+)
+@pytest.mark.parametrize("big", [False, True])
+def test_times_of_points_as_drivers_write_them(
+    name: str, kind: int, values: list[float], big: bool
+) -> None:
+    code = {6: "I", 7: "f", 8: "d"}[kind]
+    order = ">" if big else "<"
+    data = b"".join(struct.pack(f"{order}fff{code}", 1.0, 2.0, 3.0, value) for value in values)
+    step = len(data) // 3
+    fields = [*XYZ, field(name, 12, kind, 1)]
+    layout = {"width": 3, "point_step": step, "row_step": len(data), "is_bigendian": big}
+    got = decode_cloud(message(data, fields=fields, **layout), "left", 0.0)
+    unit, since = (1e-9 if kind == 6 else 1.0), (1_700_000_000.25 if name == "timestamp" else 0.0)
+    assert got.times is not None
+    np.testing.assert_allclose(got.times, unit * np.array(values) - since, atol=1e-6)
+    np.testing.assert_array_equal(got.points, np.tile([1.0, 2.0, 3.0], (3, 1)))
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "value"),
+    [
+        ("time", 7, np.nan),
+        ("time", 7, 2.0),
+        ("timestamp", 8, 5.0),
+        ("time", 6, 5),
+        ("when", 7, 0.1),
+    ],
+)
+def test_what_is_no_time_is_left(name: str, kind: int, value: float) -> None:
+    code = {6: "I", 7: "f", 8: "d"}[kind]
+    data = struct.pack(f"<fff{code}", 1.0, 2.0, 3.0, value)
+    fields = [*XYZ, field(name, 12, kind, 1)]
+    got = decode_cloud(message(data, fields=fields, width=1, point_step=len(data)), "left", 0.0)
+    assert got.times is None
+    assert len(got.points) == 1
+
+
+def test_own_clouds_keep_their_times() -> None:
+    since = np.linspace(-0.1, 0.0, len(POINTS))
+    got = decode_cloud(encode_cloud(STAMP, "lidar", POINTS, times=since), "left", 3.0)
+    assert got.times is not None
+    np.testing.assert_allclose(got.times, since, atol=1e-6)
+    unfit = POINTS.copy()
+    unfit[0] = np.nan
+    got = decode_cloud(encode_cloud(STAMP, "lidar", unfit, times=since), "left", 3.0)
+    assert got.times is not None
+    np.testing.assert_allclose(got.times, since[1:], atol=1e-6)

@@ -21,7 +21,6 @@ from backend.pipeline.config import Config
 from backend.pipeline.people_records import Seen
 from backend.pipeline.place import base_transform, place
 from backend.pipeline.records import Health, MachineState, Snapshot
-from backend.pipeline.watch import Cloud
 from backend.safety.partner import Limits
 from backend.safety.people import Watch
 from backend.shell.link.cloud import Cloud as HeardCloud
@@ -31,6 +30,7 @@ from backend.shell.link.topics import topic
 from backend.shell.people_loop import PeopleLoop, people_worker, placed_cloud
 from backend.shell.sim.lidar import Lidar, Person, scan
 from backend.site.site import load_site
+from backend.spatial.transform import apply
 
 pytestmark = pytest.mark.processes
 
@@ -83,14 +83,48 @@ CONFIG = Config(
 def test_a_cloud_is_placed_by_the_poses_of_its_moment() -> None:
     poses = tuple((t, state(t)) for t in (9.98, 10.0, 10.02, 10.04))
     cloud = HeardCloud("left", "lidar", 10.013 - OFFSET, 10.2, np.zeros((4, 3), np.float32))
-    placed = placed_cloud(cloud, poses, dict(CONFIG.machines))
-    assert isinstance(placed, Cloud)
+    found = placed_cloud(cloud, poses, dict(CONFIG.machines))
+    assert isinstance(found, tuple)
+    (placed,) = found
     assert placed.time == pytest.approx(10.013)
     links = link_poses(MINI, pose(10.013).joints, np.eye(4))
     np.testing.assert_allclose(
         placed.T_site_sensor, sensor_pose(MINI, MINI.lidars[0], links), atol=1e-9
     )
     np.testing.assert_allclose(placed.machines.centers, body_boxes(MINI, links).centers, atol=1e-9)
+
+
+def test_points_of_a_turn_are_placed_by_their_own_times() -> None:
+    """A post that is seen all through a turn of a machine that swings by 3.4 degrees meanwhile."""
+    post = np.array([6.0, 1.0, 1.0])
+    end, since = 10.1, np.linspace(-0.1, 0.0, 21)
+    (mount,) = MINI.lidars
+    seen = []
+    for t in end + since:
+        T = sensor_pose(MINI, mount, link_poses(MINI, pose(t).joints, np.eye(4)))
+        seen.append((post - T[:3, 3]) @ T[:3, :3])
+    points = np.array(seen, dtype=np.float32)
+    poses = tuple((t, state(t)) for t in np.arange(9.96, 10.14, 0.02))
+    off = {}
+    for times in (since.astype(np.float32), None):
+        cloud = HeardCloud("left", "lidar", end - OFFSET, 10.2, points, times)
+        found = placed_cloud(cloud, poses, dict(CONFIG.machines))
+        assert isinstance(found, tuple)
+        assert sum(len(part.points) for part in found) == len(points)
+        there = [apply(part.T_site_sensor, part.points) for part in found]
+        off[times is None] = np.linalg.norm(np.concatenate(there) - post, axis=1).max()
+    assert off[False] < 0.06
+    assert off[True] > 0.25
+
+
+def test_a_turn_waits_for_the_poses_of_its_last_points() -> None:
+    poses = tuple((t, state(t)) for t in (9.9, 10.0))
+    late = np.array([-0.1, 0.05], np.float32)
+    cloud = HeardCloud("left", "lidar", 10.0 - OFFSET, 10.2, np.ones((2, 3), np.float32), late)
+    assert placed_cloud(cloud, poses, dict(CONFIG.machines)) == "wait"
+    found = placed_cloud(cloud, (*poses, (10.06, state(10.06))), dict(CONFIG.machines))
+    assert isinstance(found, tuple)
+    np.testing.assert_allclose([part.time for part in found], [9.9, 10.05], atol=1e-6)
 
 
 def test_what_cannot_be_placed_says_why() -> None:

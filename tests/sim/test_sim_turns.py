@@ -107,6 +107,18 @@ def test_as_many_clouds_as_lidars_and_none_without() -> None:
     assert scan_at(yard(), 0.0, none, (), np.random.default_rng(0)) == ()
 
 
+def test_parts_of_a_turn_make_the_whole_of_it() -> None:
+    own, rng = swung(MINI, 0.7), np.random.default_rng(0)
+    (whole,) = scan_at(yard(), 3.0, own, (), rng, EXACT)
+    parts = [scan_at(yard(), 3.0, own, (), rng, EXACT, part=(k, 7))[0] for k in range(7)]
+    assert all(len(part.points) for part in parts)
+    points = np.concatenate([part.points for part in parts])
+    hit = np.concatenate([part.hit for part in parts])
+    order, again = (np.lexsort(np.round(p, 4).T) for p in (whole.points, points))
+    np.testing.assert_allclose(points[again], whole.points[order], atol=1e-4)
+    np.testing.assert_array_equal(np.bincount(hit + 1), np.bincount(whole.hit + 1))
+
+
 def test_the_same_seed_gives_the_same_cloud() -> None:
     clouds = [
         scan_at(yard(), 3.0, swung(MINI, 0.1), (), np.random.default_rng(seed))[0].points

@@ -62,17 +62,27 @@ def encode_picture(stamp: float, frame: str, jpeg: bytes) -> bytes:
 
 
 def encode_cloud(
-    stamp: float, sensor: str, points: AnyArray, intensity: AnyArray | None = None
+    stamp: float,
+    sensor: str,
+    points: AnyArray,
+    intensity: AnyArray | None = None,
+    times: AnyArray | None = None,
 ) -> bytes:
     """sensor_msgs/PointCloud2 of float32. stamp: moment of the turn [s]; sensor: the mount's name;
-    points: (n, 3) in the sensor's frame [m]; intensity: (n,), left out when None.
+    points: (n, 3) in the sensor's frame [m]; intensity: (n,); times: (n,) when each point was
+    measured, since the stamp [s]; both left out when None.
     """
-    names = ("x", "y", "z") if intensity is None else ("x", "y", "z", "intensity")
+    more = {
+        name: values
+        for name, values in (("intensity", intensity), ("time", times))
+        if values is not None
+    }
+    names = ("x", "y", "z", *more)
     n, step = len(points), 4 * len(names)
     columns = np.empty((n, len(names)), dtype="<f4")
     columns[:, :3] = points
-    if intensity is not None:
-        columns[:, 3] = intensity
+    for k, values in enumerate(more.values()):
+        columns[:, 3 + k] = values
     fields = [_PointField(name, 4 * k, 7, 1) for k, name in enumerate(names)]  # 7: FLOAT32
     data = columns.reshape(-1).view(np.uint8)
     return _bytes(

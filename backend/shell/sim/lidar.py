@@ -65,6 +65,8 @@ class Scan(NamedTuple):
 Ground: TypeAlias = tuple[Array, float]
 """Upward unit normal (3,) and offset [m]."""
 LEVEL: Ground = (np.array([0.0, 0.0, 1.0]), 0.0)
+WHOLE = (0, 1)
+"""The first of one part: a whole turn."""
 
 
 def scan(
@@ -74,11 +76,12 @@ def scan(
     people: tuple[Person, ...],
     rng: np.random.Generator,
     ground: Ground = LEVEL,
+    part: tuple[int, int] = WHOLE,
 ) -> Scan:
-    """One turn, as if everything stood still during it, in the frame of the scene. T_site_sensor:
-    (4, 4).
+    """One turn, or a part of one, as if everything stood still during it, in the frame of the
+    scene. T_site_sensor: (4, 4); part: which one, of how many.
     """
-    seen = measured(lidar, T_site_sensor, boxes, people, rng, ground)
+    seen = measured(lidar, T_site_sensor, boxes, people, rng, ground, part)
     return Scan(apply(T_site_sensor, seen.points), seen.hit)
 
 
@@ -89,9 +92,12 @@ def measured(
     people: tuple[Person, ...],
     rng: np.random.Generator,
     ground: Ground = LEVEL,
+    part: tuple[int, int] = WHOLE,
 ) -> Scan:
     """The same in the frame of the sensor, as it tells it."""
-    azimuths = np.arange(lidar.directions) * (2.0 * math.pi / lidar.directions)
+    k, n = part
+    directions = np.arange(k * lidar.directions // n, (k + 1) * lidar.directions // n)
+    azimuths = directions * (2.0 * math.pi / lidar.directions)
     cylinders = np.concatenate([np.zeros((0, 5)), *(person.cylinders() for person in people)])
     R, origin = np.ascontiguousarray(T_site_sensor[:3, :3]), T_site_sensor[:3, 3].copy()
     far, hit = cast(
@@ -103,6 +109,7 @@ def measured(
         cylinders,
         np.append(*ground),
         lidar.farthest,
+        (int(directions[0]), lidar.directions),
     )
     back = np.isfinite(far) & (rng.random(far.shape) >= lidar.lost)
     e, a = np.nonzero(back)

@@ -22,16 +22,19 @@ def cast(
     cylinders: Array,
     ground: Array,
     farthest: float,
+    of: tuple[int, int],
 ) -> tuple[Array, IntArray]:
     """(range (b, a) [m], infinite without an echo; hit (b, a): -2 nothing, -1 ground, a box's
     number, after the boxes a cylinder's).
 
     origin: (3,) of the sensor; T: (3, 3) its attitude, x at azimuth 0, z along its axis;
-    elevations: (b,), azimuths: (a,) [rad], evenly spaced over a turn from 0; boxes: centers,
-    rotations, half extents; cylinders: (c, 5) x, y, bottom, radius, height; ground: (4,) normal and
-    offset. Each body is asked only by the rays between the azimuths and elevations around it.
+    elevations: (b,), azimuths: (a,) [rad], a part of those that are evenly spaced over a turn from
+    0: of: the number of the first, and how many a turn has; boxes: centers, rotations, half
+    extents; cylinders: (c, 5) x, y, bottom, radius, height; ground: (4,) normal and offset. Each
+    body is asked only by the rays between the azimuths and elevations around it.
     """
     n_e, n_a = len(elevations), len(azimuths)
+    start, whole = of
     out, hit = np.full((n_e, n_a), np.inf), np.full((n_e, n_a), -2, np.int64)
     turn = np.empty((n_a, 2))
     for a in range(n_a):
@@ -66,13 +69,15 @@ def cast(
             p2 = (h[b, 2] if k & 1 else -h[b, 2]) - at[2]
             for j in range(3):
                 corners[k, j] = M[0, j] * p0 + M[1, j] * p1 + M[2, j] * p2
-        low, high, first, many = _window(corners, n_a)
+        low, high, first, many = _window(corners, whole)
         for e in range(n_e):
             if not low <= elevations[e] <= high:
                 continue
             z0, z1, z2 = M[0, 2] * beam[e, 1], M[1, 2] * beam[e, 1], M[2, 2] * beam[e, 1]
             for k in range(many):
-                a = (first + k) % n_a
+                a = (first + k) % whole - start
+                if not 0 <= a < n_a:
+                    continue
                 x, y = beam[e, 0] * turn[a, 0], beam[e, 0] * turn[a, 1]
                 t = _to_box(
                     at,
@@ -92,12 +97,14 @@ def cast(
             p2 = one[2] + (one[4] if k & 1 else 0.0) - origin[2]
             for j in range(3):
                 corners[k, j] = T[0, j] * p0 + T[1, j] * p1 + T[2, j] * p2
-        low, high, first, many = _window(corners, n_a)
+        low, high, first, many = _window(corners, whole)
         for e in range(n_e):
             if not low <= elevations[e] <= high:
                 continue
             for k in range(many):
-                a = (first + k) % n_a
+                a = (first + k) % whole - start
+                if not 0 <= a < n_a:
+                    continue
                 x, y, z = beam[e, 0] * turn[a, 0], beam[e, 0] * turn[a, 1], beam[e, 1]
                 for j in range(3):
                     way[j] = T[j, 0] * x + T[j, 1] * y + T[j, 2] * z

@@ -43,13 +43,14 @@ from backend.shell.sim.drives import (
     simulated,
 )
 from backend.shell.sim.dynamics import SimState
-from backend.shell.sim.lidar import Lidar, Person, scan
+from backend.shell.sim.lidar import Lidar, Person, measured
 from backend.shell.sim.radio import Radio
 from backend.site.site import load_site
 from backend.spatial.boxes import Boxes, concatenated
-from backend.spatial.types import Array
+from backend.spatial.types import AnyArray, Array
 
 TURN = 0.1  # of a LiDAR [s]
+PARTS = 5  # of a turn; the machine and the people move on from one to the next
 WORK = 0.06  # from a cloud's arrival to its tracks [s]
 SHY = 0.6  # nearer to a machine's body nobody walks by himself [m]
 STILL = 0.01  # slower machines stand [rad/s, m/s]
@@ -195,28 +196,44 @@ class _Eyes:
         self._machine = machine
         self._delay, self._rng = delay, rng
         self._due = 0.0
+        self._parts: list[tuple[float, list[AnyArray], list[AnyArray]]] = []
         self._coming: deque[HeardCloud] = deque()
         self._poses: deque[tuple[float, dict[str, MachineState]]] = deque(maxlen=60)
         self._state = Watched()
         self._last: dict[int, float] = {}
 
     def look(self, one: Simulated, walkers: list[Walker], t: float) -> None:
-        """A turn of every LiDAR when it is due."""
+        """A part of a turn of every LiDAR when it is due; clouds when the turn is done."""
         if t < self._due - 1e-9:
             return
-        self._due += TURN
+        self._due += TURN / PARTS
         links = link_poses(one.machine, one.state.q, one.state.T_site_root)
         bodies = bodies_of(one.machine, one.state)
         people = tuple(Person(walker.place) for walker in walkers)
+        part = len(self._parts)
+        clouds, hits = [], []
         for mount in one.machine.lidars:
             T = sensor_pose(one.machine, mount, links)
-            seen = scan(Lidar(elevations=mount.elevations), T, bodies, people, self._rng)
-            points = ((seen.points - T[:3, 3]) @ T[:3, :3]).astype(np.float32)
-            for k in range(len(walkers)):
-                first = len(bodies) + 2 * k
-                if ((seen.hit == first) | (seen.hit == first + 1)).sum() >= SEEN:
-                    self._last[k] = t
-            self._coming.append(HeardCloud(one.name, mount.name, t, t + self._delay, points))
+            lidar = Lidar(elevations=mount.elevations)
+            seen = measured(lidar, T, bodies, people, self._rng, part=(part, PARTS))
+            clouds.append(seen.points.astype(np.float32))
+            hits.append(seen.hit)
+        self._parts.append((t, clouds, hits))
+        if len(self._parts) == PARTS:
+            self._turned(one, len(bodies), len(walkers), t)
+
+    def _turned(self, one: Simulated, bodies: int, walkers: int, t: float) -> None:
+        for k, mount in enumerate(one.machine.lidars):
+            points = np.concatenate([clouds[k] for _, clouds, _ in self._parts])
+            since = [np.full(len(clouds[k]), at - t) for at, clouds, _ in self._parts]
+            hit = np.concatenate([hits[k] for *_, hits in self._parts])
+            for who in range(walkers):
+                first = bodies + 2 * who
+                if ((hit == first) | (hit == first + 1)).sum() >= SEEN:
+                    self._last[who] = t
+            times = np.concatenate(since).astype(np.float32)
+            self._coming.append(HeardCloud(one.name, mount.name, t, t + self._delay, points, times))
+        self._parts = []
 
     def keep(self, time: float, machines: dict[str, MachineState]) -> None:
         self._poses.append((time, machines))
@@ -229,8 +246,8 @@ class _Eyes:
             if found == "wait":
                 break
             self._coming.popleft()
-            if isinstance(found, Cloud):
-                clouds.append(found)
+            if isinstance(found, tuple):
+                clouds += found
         if not clouds:
             return None
         self._state, seen = watch(self._state, tuple(clouds))

@@ -21,11 +21,12 @@ from backend.shell.sim.dynamics import SimState
 from backend.shell.sim.lidar import Lidar, scan
 from backend.shell.sim.partners import Partners
 from backend.shell.sim.radio import OnAir, Radio, arrival_time, receive
-from backend.shell.sim.turns import scan_at
+from backend.shell.sim.turns import Turn, scan_at
 from backend.site.site import Site
 from backend.spatial.boxes import NO_BOXES
 
 PERIOD = 0.1  # of a turn [s]
+PARTS = 5  # of a turn; the machine moves on from one to the next
 
 
 class TurningLidars:
@@ -73,15 +74,19 @@ class TurningLidars:
     def _run(self) -> None:
         self._partners.listen(True)
         on_air: tuple[OnAir[bytes], ...] = ()
-        due, before = time.monotonic(), -np.inf
+        due, before, parts = time.monotonic(), -np.inf, []
         while not self._closing.is_set():
             now, state = time.monotonic(), self._state()
             if now >= due:
-                due = max(due + PERIOD, now)
+                late = now - due > PERIOD / PARTS  # then some parts of the turn are left out
+                due = now + PERIOD / PARTS if late else due + PERIOD / PARTS
                 if state is not None and state[1] > before:
                     before = state[1]
+                    parts.append((before, self._part(len(parts), *state)))
+                if len(parts) == PARTS:
                     delay = arrival_time(before, self._radio) - before
-                    on_air += tuple(OnAir(now + delay, cloud) for cloud in self._turn(*state))
+                    on_air += tuple(OnAir(now + delay, cloud) for cloud in clouds(parts))
+                    parts = []
             if self._cut():
                 on_air = ()
             arrived, on_air = receive(on_air, time.monotonic())
@@ -91,7 +96,22 @@ class TurningLidars:
             self._closing.wait(max(0.001, until - time.monotonic()))
         self._partners.listen(False)
 
-    def _turn(self, state: SimState, stamp: float) -> list[bytes]:
+    def _part(self, k: int, state: SimState, stamp: float) -> tuple[Turn, ...]:
         own = Seen(self._machine, state.q, state.T_site_root, self._paint)
-        seen = scan_at(self._site, self._schedule(stamp), own, self._partners.seen(), self._rng)
-        return [encode_cloud(stamp, turn.sensor, turn.points) for turn in seen]
+        others, when = self._partners.seen(), self._schedule(stamp)
+        return scan_at(self._site, when, own, others, self._rng, part=(k, PARTS))
+
+
+def clouds(parts: list[tuple[float, tuple[Turn, ...]]]) -> list[bytes]:
+    """A PointCloud2 of each LiDAR from the parts of one turn and their stamps [s]; its own stamp is
+    the last one.
+    """
+    end = parts[-1][0]
+    found = []
+    for turns in zip(*(turns for _, turns in parts), strict=True):
+        times = [
+            np.full(len(turn.points), at - end) for (at, _), turn in zip(parts, turns, strict=True)
+        ]
+        points = np.concatenate([turn.points for turn in turns])
+        found.append(encode_cloud(end, turns[0].sensor, points, times=np.concatenate(times)))
+    return found

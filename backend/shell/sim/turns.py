@@ -10,7 +10,7 @@ import numpy as np
 from backend.machine.kinematics import body_boxes, link_poses
 from backend.machine.lidars import sensor_pose
 from backend.shell.sim.cab import Seen
-from backend.shell.sim.lidar import Lidar, measured
+from backend.shell.sim.lidar import WHOLE, Lidar, measured
 from backend.shell.sim.walkers import people_at, vehicles_at
 from backend.site.site import Site
 from backend.spatial.boxes import concatenated
@@ -38,11 +38,13 @@ def scan_at(
     others: Iterable[Seen],
     rng: np.random.Generator,
     lidar: Lidar | None = None,
+    part: tuple[int, int] = WHOLE,
 ) -> tuple[Turn, ...]:
     """What the LiDARs of `own` measure t [s] on the schedule, in the order of its machine's mounts.
 
-    others: the other machines; lidar: what all of them are like, apart from their beams. Obstacles,
-    people and vehicles are the site's, the ground is z = 0; all stand still during the turn.
+    others: the other machines; lidar: what all of them are like, apart from their beams; part: of a
+    turn, which one of how many. Obstacles, people and vehicles are the site's, the ground is z = 0;
+    all stand still during the turn or its part.
     """
     alike = lidar or Lidar()
     links = link_poses(own.machine, own.q, own.T_site_root)
@@ -53,6 +55,8 @@ def scan_at(
     turns = []
     for mount in own.machine.lidars:
         T = sensor_pose(own.machine, mount, links)
-        seen = measured(replace(alike, elevations=mount.elevations), T, boxes, people, rng)
+        seen = measured(
+            replace(alike, elevations=mount.elevations), T, boxes, people, rng, part=part
+        )
         turns.append(Turn(mount.name, T, seen.points.astype(np.float32), seen.hit))
     return tuple(turns)
