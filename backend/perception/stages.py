@@ -1,4 +1,4 @@
-"""What detection made of every point, to be looked at: codes, counts, and a picture of few points."""
+"""What detection made of every point, to be looked at: codes, counts, and a picture of a few."""
 
 from __future__ import annotations
 

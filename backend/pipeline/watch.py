@@ -12,11 +12,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from backend.perception.detect import Objects, Stages, detect, within
 from backend.perception.detect import Settings as Detecting
-from backend.perception.detect import detect, within
+from backend.perception.stages import MOST, StagedScan, codes, counts, thinned
 from backend.pipeline.people_records import Missing, Seen, Sensor
 from backend.spatial.boxes import NO_BOXES, Boxes
-from backend.spatial.types import Array
+from backend.spatial.types import Array, BoolArray
 from backend.tracking.records import (
     MEASURED,
     PX,
@@ -57,6 +58,26 @@ class Watched:
     next_id: int = 1
 
 
+@dataclass(frozen=True)
+class Scan:
+    """All clouds together. time: the newest cloud's [s]; points: (n, 3) site frame, those that are
+    numbers [m]; origin: (n, 3) of the sensor of each; near: (n,) within reach of it; machine: (n,)
+    of them, of a machine's own body.
+    """
+
+    time: float
+    points: Array
+    origin: Array
+    near: BoolArray
+    machine: BoolArray
+    sensors: tuple[Sensor, ...]
+
+    @property
+    def kept(self) -> BoolArray:
+        """(n,) what objects are looked for in."""
+        return self.near & ~self.machine
+
+
 def watch(
     before: Watched,
     clouds: tuple[Cloud, ...],
@@ -67,28 +88,63 @@ def watch(
     cloud's. Clouds from before the last scan's time are merged all the same.
     """
     settings = detecting or Detecting()
-    time = max(max(cloud.time for cloud in clouds), before.tracks.time)
-    kept, origins, sensors = [], [], []
+    scan = merged(clouds, settings)
+    return follow(before, scan, found_in(scan, settings).objects, tracking)
+
+
+def merged(clouds: tuple[Cloud, ...], settings: Detecting) -> Scan:
+    """Clouds, at least one, in the site frame, each by its own moment's poses and bodies."""
+    parts, sensors = [], []
     for cloud in clouds:
         R, origin = cloud.T_site_sensor[:3, :3], cloud.T_site_sensor[:3, 3]
         points = np.asarray(cloud.points, dtype=float)
         points = points[np.isfinite(points).all(axis=1)] @ R.T + origin
-        points = points[np.hypot(*(points - origin)[:, :2].T) <= settings.reach]
-        points = points[~within(points, cloud.machines, settings)]
-        kept.append(points)
-        origins.append(np.broadcast_to(origin, points.shape))
+        near = np.hypot(*(points - origin)[:, :2].T) <= settings.reach
+        machine = np.zeros(len(points), dtype=bool)
+        machine[near] = within(points[near], cloud.machines, settings)
+        parts.append((points, np.broadcast_to(origin, points.shape), near, machine))
         x, y, z = origin.tolist()
         sensors.append(
             Sensor(cloud.machine, cloud.sensor, cloud.time, (x, y, z), len(cloud.points))
         )
-    merged, origin = np.concatenate(kept), np.concatenate(origins)
-    objects = detect(merged, origin, NO_BOXES, settings).objects
+    points, origins, near, machine = (np.concatenate(column) for column in zip(*parts, strict=True))
+    time = max(cloud.time for cloud in clouds)
+    return Scan(time, points, origins, near, machine, tuple(sensors))
+
+
+def found_in(scan: Scan, settings: Detecting) -> Stages:
+    """Stages of the points that are `kept`, in their order."""
+    kept = scan.kept
+    return detect(scan.points[kept], scan.origin[kept], NO_BOXES, settings)
+
+
+def follow(
+    before: Watched, scan: Scan, objects: Objects, tracking: Settings | None = None
+) -> tuple[Watched, Seen]:
+    """The tracks after a scan in which these objects were found."""
+    time = max(scan.time, before.tracks.time)
     values = np.column_stack([objects.center, objects.yaw, objects.size])
     found = track(
         before.tracks, Detections(time, values, MEASURED, NOISE), before.next_id, tracking
     )
-    return Watched(found.tracks, found.next_id), _seen(
-        found.tracks, time, tuple(sensors), found.lost
+    return Watched(found.tracks, found.next_id), _seen(found.tracks, time, scan.sensors, found.lost)
+
+
+def staged(scan: Scan, found: Stages, most: int = MOST) -> StagedScan:
+    """What became of every point of a scan, thinned to `most` of them. found: as of `found_in`."""
+    kept = np.flatnonzero(scan.kept)
+    ground, cluster = np.zeros(len(scan.points), dtype=bool), np.full(len(scan.points), -1)
+    ground[kept[found.ground]], cluster[kept] = True, found.cluster
+    stage = codes(Stages(scan.near, scan.machine, ground, cluster, found.plane, found.objects))
+    rows = thinned(stage, cluster, most)
+    return StagedScan(
+        scan.time,
+        scan.points[rows].astype(np.float32),
+        stage[rows],
+        cluster[rows],
+        counts(stage),
+        found.plane,
+        found.objects,
     )
 
 
