@@ -9,7 +9,7 @@ import numpy as np
 from backend.errors import InputError
 from backend.perception.detect import Objects, Stages
 from backend.perception.ground import Plane
-from backend.spatial.types import Array, IntArray
+from backend.spatial.types import AnyArray, IntArray
 
 OUTSIDE, MACHINE, GROUND, OBJECT, LEFT = range(5)
 NAMES = ("outside", "machine", "ground", "object", "left")
@@ -22,21 +22,21 @@ MOST = 8_000
 
 @dataclass(frozen=True)
 class StagedScan:
-    """One scan as it is looked at. time [s]; points: (n, 3) site frame [m]; stage: (n,) codes;
-    cluster: (n,) row of objects, -1 for none; counts: points of each stage, by code, before
-    `thinned`; plane: the ground, None when none was found.
+    """One scan as it is looked at. time [s]; points: (n, 3) site frame, float32 [m]; stage: (n,)
+    codes, uint8; cluster: (n,) row of objects, -1 for none; counts: points of each stage, by code,
+    before `thinned`; plane: the ground, None when none was found.
     """
 
     time: float
-    points: Array
-    stage: IntArray
+    points: AnyArray
+    stage: AnyArray
     cluster: IntArray
     counts: tuple[int, ...]
     plane: Plane | None
     objects: Objects
 
 
-def codes(stages: Stages) -> IntArray:
+def codes(stages: Stages) -> AnyArray:
     """(n,) the stage at which each point ended, uint8."""
     found = np.full(len(stages.near), OUTSIDE, np.uint8)
     found[stages.near] = LEFT
@@ -46,12 +46,12 @@ def codes(stages: Stages) -> IntArray:
     return found
 
 
-def counts(stage: IntArray) -> tuple[int, ...]:
+def counts(stage: AnyArray) -> tuple[int, ...]:
     """How many points ended at each stage, by code. stage: (n,) codes."""
     return tuple(int(n) for n in np.bincount(stage, minlength=len(NAMES)))
 
 
-def thinned(stage: IntArray, cluster: IntArray, most: int = MOST) -> IntArray:
+def thinned(stage: AnyArray, cluster: IntArray, most: int = MOST) -> IntArray:
     """Rows of at most `most` points, in order, that show every stage and every object.
 
     Every stage but objects, and every object by itself, may keep the same number of points
