@@ -9,6 +9,7 @@ own moment: so the machine's own motion is no motion of what it sees (Rasul 2021
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
@@ -58,24 +59,27 @@ class Watched:
     next_id: int = 1
 
 
+class Part(NamedTuple):
+    """One cloud of a scan. points: (n, 3) site frame, those that are numbers [m]; near: (n,) within
+    reach of its sensor; machine: of those near, of a machine's own body.
+    """
+
+    points: Array
+    near: BoolArray
+    machine: BoolArray
+
+
 @dataclass(frozen=True)
 class Scan:
-    """All clouds together. time: the newest cloud's [s]; points: (n, 3) site frame, those that are
-    numbers [m]; origin: (n, 3) of the sensor of each; near: (n,) within reach of it; machine: (n,)
-    of them, of a machine's own body.
+    """All clouds together. time: the newest cloud's [s]; points: (n, 3) site frame, in which
+    objects are looked for [m]; origin: (n, 3) of the sensor of each; parts: where they are from.
     """
 
     time: float
     points: Array
     origin: Array
-    near: BoolArray
-    machine: BoolArray
     sensors: tuple[Sensor, ...]
-
-    @property
-    def kept(self) -> BoolArray:
-        """(n,) what objects are looked for in."""
-        return self.near & ~self.machine
+    parts: tuple[Part, ...]
 
 
 def watch(
@@ -94,28 +98,28 @@ def watch(
 
 def merged(clouds: tuple[Cloud, ...], settings: Detecting) -> Scan:
     """Clouds, at least one, in the site frame, each by its own moment's poses and bodies."""
-    parts, sensors = [], []
+    kept, origins, sensors, parts = [], [], [], []
     for cloud in clouds:
         R, origin = cloud.T_site_sensor[:3, :3], cloud.T_site_sensor[:3, 3]
         points = np.asarray(cloud.points, dtype=float)
         points = points[np.isfinite(points).all(axis=1)] @ R.T + origin
         near = np.hypot(*(points - origin)[:, :2].T) <= settings.reach
-        machine = np.zeros(len(points), dtype=bool)
-        machine[near] = within(points[near], cloud.machines, settings)
-        parts.append((points, np.broadcast_to(origin, points.shape), near, machine))
+        around = points[near]
+        machine = within(around, cloud.machines, settings)
+        kept.append(around[~machine])
+        origins.append(np.broadcast_to(origin, kept[-1].shape))
+        parts.append(Part(points, near, machine))
         x, y, z = origin.tolist()
         sensors.append(
             Sensor(cloud.machine, cloud.sensor, cloud.time, (x, y, z), len(cloud.points))
         )
-    points, origins, near, machine = (np.concatenate(column) for column in zip(*parts, strict=True))
     time = max(cloud.time for cloud in clouds)
-    return Scan(time, points, origins, near, machine, tuple(sensors))
+    return Scan(time, np.concatenate(kept), np.concatenate(origins), tuple(sensors), tuple(parts))
 
 
 def found_in(scan: Scan, settings: Detecting) -> Stages:
-    """Stages of the points that are `kept`, in their order."""
-    kept = scan.kept
-    return detect(scan.points[kept], scan.origin[kept], NO_BOXES, settings)
+    """Stages of the points of a scan in which objects are looked for."""
+    return detect(scan.points, scan.origin, NO_BOXES, settings)
 
 
 def follow(
@@ -132,14 +136,17 @@ def follow(
 
 def staged(scan: Scan, found: Stages, most: int = MOST) -> StagedScan:
     """What became of every point of a scan, thinned to `most` of them. found: as of `found_in`."""
-    kept = np.flatnonzero(scan.kept)
-    ground, cluster = np.zeros(len(scan.points), dtype=bool), np.full(len(scan.points), -1)
-    ground[kept[found.ground]], cluster[kept] = True, found.cluster
-    stage = codes(Stages(scan.near, scan.machine, ground, cluster, found.plane, found.objects))
+    points = np.concatenate([part.points for part in scan.parts])
+    near = np.concatenate([part.near for part in scan.parts])
+    machine, ground = np.zeros(len(points), dtype=bool), np.zeros(len(points), dtype=bool)
+    machine[near] = np.concatenate([part.machine for part in scan.parts])
+    kept, cluster = near & ~machine, np.full(len(points), -1)
+    ground[kept], cluster[kept] = found.ground, found.cluster
+    stage = codes(Stages(near, machine, ground, cluster, found.plane, found.objects))
     rows = thinned(stage, cluster, most)
     return StagedScan(
         scan.time,
-        scan.points[rows].astype(np.float32),
+        points[rows].astype(np.float32),
         stage[rows],
         cluster[rows],
         counts(stage),
