@@ -20,6 +20,10 @@ def detect(
     out: Annotated[
         Path | None, typer.Option(help="Also write the boxes as CSV, which `cockpit track` reads.")
     ] = None,
+    stages: Annotated[
+        Path | None,
+        typer.Option(help="Also write what became of every point, as arrays of numpy (.npz)."),
+    ] = None,
     ground: Annotated[
         bool, typer.Option(help="Look for the ground and take it out; or there is none.")
     ] = True,
@@ -42,4 +46,5 @@ def detect(
     """Find people and objects in a LiDAR's point clouds."""
     from cockpit.detect import Times, run_detect
 
-    run_detect(clouds, json_, out, ground, link, origin, reach, Times(period, stamped))
+    times = Times(period, stamped)
+    run_detect(clouds, json_, out, ground, link, origin, reach, times, stages)

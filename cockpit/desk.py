@@ -187,9 +187,15 @@ class Desk:
             if isinstance(name, str) and name in self._config.own:
                 self.recent.ask(name)
             return
+        view = self._view()
+        if kind == "stages":  # likewise
+            shown = message.get("shown")
+            if view is not None and isinstance(shown, list) and all(map(_is_text, shown)):
+                with contextlib.suppress(ValueError):
+                    view.set_stages(shown, page)
+            return
         if isinstance(kind, str):
             self._action(kind, page, message)
-        view = self._view()
         with contextlib.suppress(ValueError, InputError):
             if view is not None and kind == "ghost":
                 self._show_ghost(view, name, message.get("joints"), page)
@@ -240,3 +246,7 @@ class Desk:
             self._tip_heights.pop(own, None)
         elif isinstance(height, int | float) and abs(height) < MAX_HEIGHT:
             self._tip_heights[own] = float(height)
+
+
+def _is_text(value: Any) -> bool:
+    return isinstance(value, str)

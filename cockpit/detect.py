@@ -24,6 +24,8 @@ from backend.perception.detect import Settings, Stages, detect, detect_above
 from backend.shell.app.wire import dumps
 from backend.spatial.boxes import NO_BOXES
 from backend.spatial.types import Array
+from cockpit.detect_stages import StagedFile
+from cockpit.detect_stages import write as write_stages
 
 COLUMNS = ("time", "x", "y", "z", "yaw", "length", "width", "height")
 """Of the CSV file, as `cockpit track` reads it."""
@@ -72,26 +74,34 @@ def run_detect(
     origin: str,
     reach: float,
     times: Times,
+    stages: Path | None = None,
 ) -> None:
-    """Prints what is in each file and writes the CSV. Raises InputError."""
+    """Prints what is in each file; writes the CSV and what became of every point. Raises
+    InputError.
+    """
     settings = Settings(link=link, reach=reach)
     place = _place(origin) if origin else None
     stamps = times.of(paths)
-    scans = []
+    scans, staged = [], []
     for path, time in zip(paths, stamps, strict=True):
-        scans.append(scan_of(path, time, place, ground, settings))
+        scan, one = scan_of(path, time, place, ground, settings)
+        scans.append(scan)
+        if stages is not None:
+            staged.append(one)
         if not as_json:
             print(_words(scans[-1], settings))
     if as_json:
         print(dumps(DetectionDocument(scans=scans).model_dump()))
     if out is not None:
         _write(out, scans)
+    if stages is not None:
+        write_stages(stages, staged)
 
 
 def scan_of(
     path: Path, time: float, origin: Array | None, ground: bool, settings: Settings
-) -> ScanModel:
-    """What is in one file. Raises InputError."""
+) -> tuple[ScanModel, StagedFile]:
+    """What is in one file, and what became of its points. Raises InputError."""
     try:
         content = path.read_bytes()
     except OSError as error:
@@ -100,7 +110,8 @@ def scan_of(
     place = cloud.origin if origin is None else origin
     find = detect if ground else detect_above
     found = find(cloud.points, place, NO_BOXES, settings)
-    return _scan(str(path), time, cloud, place, found, ground, settings)
+    scan = _scan(str(path), time, cloud, place, found, ground, settings)
+    return scan, StagedFile(str(path), time, cloud.points, place, found, ground)
 
 
 def rows_of(scan: ScanModel) -> Iterator[list[str]]:

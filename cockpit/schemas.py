@@ -25,6 +25,7 @@ from backend.documents.gauge_choice import GaugeChoiceFile, GaugeStateDocument
 from backend.documents.people import PeopleModel
 from backend.documents.recordings import RecordingsDocument, RecoverDocument
 from backend.documents.session import DiffDocument, SeriesDocument, SessionDocument
+from backend.documents.stages import StagesDocument
 from backend.documents.state import StateDocument
 from backend.errors import InputError
 from backend.shell.app.models import HealthModel, SiteModel, SnapshotModel
@@ -37,6 +38,7 @@ SCHEMAS: dict[str, tuple[type[BaseModel], str]] = {
     "cspace": (CspaceDocument, "what cspace --json prints"),
     "gauge": (GaugeDocument, "what gauge --json prints"),
     "detection": (DetectionDocument, "what detect --json prints"),
+    "stages": (StagesDocument, "/api/stages: what detection makes of the newest scan"),
     "along": (AlongDocument, "what along --json prints"),
     "gauge-choice": (GaugeChoiceFile, "what operators draw and switch, as it is kept"),
     "gauge-state": (GaugeStateDocument, "/api/gauge"),

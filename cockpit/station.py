@@ -15,6 +15,7 @@ from backend.control.person import Person
 from backend.documents.site import site_document
 from backend.documents.snapshot import snapshot_document
 from backend.errors import InputError
+from backend.perception.stages import StagedScan
 from backend.pipeline.people_records import Seen
 from backend.pipeline.records import Inputs, Notice, Snapshot
 from backend.shell.access.places import state_folder
@@ -25,6 +26,7 @@ from backend.shell.app.feed import Frames
 from backend.shell.app.gauge_api import gauge_router
 from backend.shell.app.metrics import metrics_router
 from backend.shell.app.server import WebServer, bind
+from backend.shell.app.stages import stages_router
 from backend.shell.app.viewer_proxy import Hooks, viewer_router
 from backend.shell.app.wire import dumps
 from backend.shell.gauge_desk import GaugeDesk
@@ -130,7 +132,9 @@ class Station:
         )
         frames = Frames(self.hub, self.document)
         relay = Relay(session, self.hub, self._texts, frames.images)
-        self.view: View = start(scene_site(site, models), self.hub, own=self.config.own[0])
+        self.view: View = start(
+            scene_site(site, models), self.hub, own=self.config.own[0], stages=self._staged
+        )
         self._closing.callback(self.view.stop)
         sources = Sources(
             site=site_document(site, self.config),
@@ -157,6 +161,7 @@ class Station:
                 metrics_router(frames, self.backend, self._recorded, options.entry.metrics_token),
                 camera_router(make_cameras(site, session)),
                 gauge_router(self.gauge),
+                *(() if self.people is None else (stages_router(self.people.look),)),
             ),
             access=access,
             streams=whep_origins(site),
@@ -237,6 +242,9 @@ class Station:
 
     def _seen(self) -> Seen | None:
         return None if self.people is None else self.people.take()
+
+    def _staged(self) -> StagedScan | None:
+        return None if self.people is None else self.people.look().stages
 
     def _event(self, what: str, who: str, details: dict[str, Any]) -> None:
         """What an operator did with a machine, for the recording and the audit log."""

@@ -9,14 +9,16 @@ own moment: so the machine's own motion is no motion of what it sees (Rasul 2021
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
+from backend.perception.detect import Objects, Stages, detect, within
 from backend.perception.detect import Settings as Detecting
-from backend.perception.detect import detect, within
+from backend.perception.stages import MOST, StagedScan, codes, counts, thinned
 from backend.pipeline.people_records import Missing, Seen, Sensor
 from backend.spatial.boxes import NO_BOXES, Boxes
-from backend.spatial.types import Array
+from backend.spatial.types import Array, BoolArray
 from backend.tracking.records import (
     MEASURED,
     PX,
@@ -57,6 +59,29 @@ class Watched:
     next_id: int = 1
 
 
+class Part(NamedTuple):
+    """One cloud of a scan. points: (n, 3) site frame, those that are numbers [m]; near: (n,) within
+    reach of its sensor; machine: of those near, of a machine's own body.
+    """
+
+    points: Array
+    near: BoolArray
+    machine: BoolArray
+
+
+@dataclass(frozen=True)
+class Scan:
+    """All clouds together. time: the newest cloud's [s]; points: (n, 3) site frame, in which
+    objects are looked for [m]; origin: (n, 3) of the sensor of each; parts: where they are from.
+    """
+
+    time: float
+    points: Array
+    origin: Array
+    sensors: tuple[Sensor, ...]
+    parts: tuple[Part, ...]
+
+
 def watch(
     before: Watched,
     clouds: tuple[Cloud, ...],
@@ -67,24 +92,63 @@ def watch(
     cloud's. Clouds from before the last scan's time are merged all the same.
     """
     settings = detecting or Detecting()
-    time = max(max(cloud.time for cloud in clouds), before.tracks.time)
-    kept, origins = [], []
+    scan = merged(clouds, settings)
+    return follow(before, scan, found_in(scan, settings).objects, tracking)
+
+
+def merged(clouds: tuple[Cloud, ...], settings: Detecting) -> Scan:
+    """Clouds, at least one, in the site frame, each by its own moment's poses and bodies."""
+    kept, origins, parts = [], [], []
     for cloud in clouds:
         R, origin = cloud.T_site_sensor[:3, :3], cloud.T_site_sensor[:3, 3]
         points = np.asarray(cloud.points, dtype=float)
         points = points[np.isfinite(points).all(axis=1)] @ R.T + origin
-        points = points[np.hypot(*(points - origin)[:, :2].T) <= settings.reach]
-        points = points[~within(points, cloud.machines, settings)]
-        kept.append(points)
-        origins.append(np.broadcast_to(origin, points.shape))
-    merged, origin = np.concatenate(kept), np.concatenate(origins)
-    objects = detect(merged, origin, NO_BOXES, settings).objects
+        near = np.hypot(*(points - origin)[:, :2].T) <= settings.reach
+        around = points[near]
+        machine = within(around, cloud.machines, settings)
+        kept.append(around[~machine])
+        origins.append(np.broadcast_to(origin, kept[-1].shape))
+        parts.append(Part(points, near, machine))
+    time = max(cloud.time for cloud in clouds)
+    points, origin = np.concatenate(kept), np.concatenate(origins)
+    return Scan(time, points, origin, _sensors(clouds), tuple(parts))
+
+
+def found_in(scan: Scan, settings: Detecting) -> Stages:
+    """Stages of the points of a scan in which objects are looked for."""
+    return detect(scan.points, scan.origin, NO_BOXES, settings)
+
+
+def follow(
+    before: Watched, scan: Scan, objects: Objects, tracking: Settings | None = None
+) -> tuple[Watched, Seen]:
+    """The tracks after a scan in which these objects were found."""
+    time = max(scan.time, before.tracks.time)
     values = np.column_stack([objects.center, objects.yaw, objects.size])
     found = track(
         before.tracks, Detections(time, values, MEASURED, NOISE), before.next_id, tracking
     )
-    return Watched(found.tracks, found.next_id), _seen(
-        found.tracks, time, _sensors(clouds), found.lost
+    return Watched(found.tracks, found.next_id), _seen(found.tracks, time, scan.sensors, found.lost)
+
+
+def staged(scan: Scan, found: Stages, most: int = MOST) -> StagedScan:
+    """What became of every point of a scan, thinned to `most` of them. found: as of `found_in`."""
+    points = np.concatenate([part.points for part in scan.parts])
+    near = np.concatenate([part.near for part in scan.parts])
+    machine, ground = np.zeros(len(points), dtype=bool), np.zeros(len(points), dtype=bool)
+    machine[near] = np.concatenate([part.machine for part in scan.parts])
+    kept, cluster = near & ~machine, np.full(len(points), -1)
+    ground[kept], cluster[kept] = found.ground, found.cluster
+    stage = codes(Stages(near, machine, ground, cluster, found.plane, found.objects))
+    rows = thinned(stage, cluster, most)
+    return StagedScan(
+        scan.time,
+        points[rows].astype(np.float32),
+        stage[rows],
+        cluster[rows],
+        counts(stage),
+        found.plane,
+        found.objects,
     )
 
 

@@ -9,22 +9,26 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterable
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
 from backend.machine.lidars import sensor_pose
 from backend.machine.model import Machine
+from backend.perception.detect import Settings as Detecting
+from backend.perception.stages import StagedScan
 from backend.pipeline.config import Config
 from backend.pipeline.people_records import Seen
 from backend.pipeline.place import between
 from backend.pipeline.records import Body3D, MachineState, Notice, Snapshot
-from backend.pipeline.watch import Cloud, Watched, watch
+from backend.pipeline.watch import Cloud, Watched, follow, found_in, merged, staged
 from backend.shell.aside import Aside, WorkerGone
 from backend.shell.image_loops import Stopwatch, ticks
 from backend.shell.link.cloud import Cloud as HeardCloud
 from backend.shell.link.cloud import decode_cloud
 from backend.shell.link.codec import DecodeError
 from backend.shell.link.receiver import Heard
+from backend.shell.stages_look import Look, StagesLook
 from backend.spatial.boxes import concatenated
 from backend.spatial.types import AnyArray
 
@@ -43,24 +47,35 @@ PART = 0.025
 MOST_PARTS = 8
 
 
-Question = tuple[int, tuple[Cloud, ...]]
-"""The least number that a new track may get, and the clouds of one scan."""
+class Question(NamedTuple):
+    """least: number that a new track may get; clouds: of one scan; staged: whether somebody looks
+    at what detection makes of the points.
+    """
+
+    least: int
+    clouds: tuple[Cloud, ...]
+    staged: bool = False
 
 
-def begin() -> Callable[[Question], Seen]:
+Answer = tuple[Seen, StagedScan | None]
+
+
+def begin() -> Callable[[Question], Answer]:
     """What the process does: it remembers who it follows."""
-    state = Watched()
+    state, settings = Watched(), Detecting()
 
-    def answer(question: Question) -> Seen:
+    def answer(question: Question) -> Answer:
         nonlocal state
-        least, clouds = question
-        state, seen = watch(replace(state, next_id=max(state.next_id, least)), clouds)
-        return seen
+        before = replace(state, next_id=max(state.next_id, question.least))
+        scan = merged(question.clouds, settings)
+        found = found_in(scan, settings)
+        state, seen = follow(before, scan, found.objects)
+        return seen, staged(scan, found) if question.staged else None
 
     return answer
 
 
-def people_worker() -> Aside[Question, Seen]:
+def people_worker() -> Aside[Question, Answer]:
     return Aside(begin, "looks for people", niceness=0)  # before images: motions wait for it
 
 
@@ -74,7 +89,7 @@ class PeopleLoop:
         self,
         config: Config,
         clouds: Callable[[], Iterable[Heard]],
-        worker: Aside[Question, Seen],
+        worker: Aside[Question, Answer],
         refused: Callable[[str], None] = lambda _: None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
@@ -89,6 +104,7 @@ class PeopleLoop:
         self._waiting: dict[tuple[str, str], HeardCloud] = {}
         self._known: set[tuple[str, str]] = set()
         self._newest: Seen | None = None
+        self._stages = StagesLook(clock)
         self._next_id = 1  # of a process that is started again: nobody gets a number twice
         self._lock = threading.Lock()
         self._stopping = threading.Event()
@@ -106,6 +122,12 @@ class PeopleLoop:
         with self._lock:
             seen, self._newest = self._newest, None
         return seen
+
+    def look(self) -> Look:
+        """What detection makes of the points, worked out only while somebody looks again and again.
+        From any thread.
+        """
+        return self._stages.look(self.trouble)
 
     def notices(self) -> tuple[Notice, ...]:
         return (Notice("people", f"PEOPLE · {self.trouble}"),) if self.trouble else ()
@@ -138,7 +160,9 @@ class PeopleLoop:
                 continue
             start = self._clock()
             try:
-                seen = self._worker.ask((self._next_id, clouds))
+                seen, stages = self._worker.ask(
+                    Question(self._next_id, clouds, self._stages.wanted())
+                )
             except (WorkerGone, RuntimeError) as error:
                 if self._stopping.is_set():
                     return
@@ -152,6 +176,8 @@ class PeopleLoop:
             self._next_id = max(self._next_id, int(seen.id.max(initial=0)) + 1)
             with self._lock:
                 self._newest = replace(seen, ready=end)
+            if stages is not None:
+                self._stages.keep(stages)
 
     def _hear(self, heard: Heard) -> None:
         try:
@@ -177,7 +203,7 @@ class PeopleLoop:
             return ()
         with self._lock:
             poses = tuple(self._poses)
-        placed = []
+        placed: list[Cloud] = []
         for key, cloud in tuple(waiting.items()):
             found = placed_cloud(cloud, poses, self._config.machines)
             if found == "wait" and now - cloud.arrival < 2.0 * GATHER:

@@ -1,16 +1,19 @@
-"""What one browser shows of its own: own machine, joint space, ghost; and where its camera is."""
+"""What one browser shows of its own: own machine, joint space, ghost, stages; and its camera."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 import viser
 
+from backend.perception.stages import StagedScan
 from backend.pipeline.records import Snapshot
 from cockpit.views.cameras import CameraPose
 from cockpit.views.ghost import GhostNodes
 from cockpit.views.inputs import SceneSite, SnapshotSource
 from cockpit.views.joint_space import JointSpace
+from cockpit.views.stage_nodes import StageNodes
 from cockpit.views.zone import OwnNodes
 
 JOINTS = "joints"  # the camera that looks at the joint space
@@ -34,6 +37,9 @@ class Browser:
         self._joints: JointSpace | None = None
         self._ghosts: dict[str, GhostNodes] = {}
         self._ghost: str | None = None
+        self._stages: StageNodes | None = None
+        self._stages_shown: frozenset[str] = frozenset()
+        self._stages_until = -math.inf
 
     @property
     def own(self) -> str:
@@ -67,6 +73,26 @@ class Browser:
             entry = self._site.machines[machine]
             self._ghosts[machine] = GhostNodes(self.client.scene, machine, entry)
         self._ghosts[machine].pose(joints, colliding)
+
+    def show_stages(self, shown: frozenset[str], until: float) -> bool:
+        """Which stages of detection are shown until then [s], none of none; whether that is new."""
+        new = shown != self._stages_shown
+        self._stages_shown, self._stages_until = shown, until
+        return new
+
+    def looks_at_stages(self, now: float) -> bool:
+        """Whether this window shows stages of detection. now: a monotonic clock [s]."""
+        return bool(self._stages_shown) and now <= self._stages_until
+
+    def update_stages(self, stages: StagedScan | None, now: float) -> None:
+        """stages: the newest, None when there are none or they are old."""
+        if not self.looks_at_stages(now):
+            stages = None
+        if self._stages is None and stages is None:
+            return
+        with self.client.atomic():
+            self._stages = self._stages or StageNodes(self.client.scene)
+            self._stages.update(stages, self._stages_shown)
 
     def update(
         self, snapshot: Snapshot, images: SnapshotSource, ground: float, now: float, lost: float

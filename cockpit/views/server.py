@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 import numpy as np
 import rich
 import viser
 
+from backend.perception.stages import StagedScan
 from backend.pipeline.records import Snapshot
 from cockpit.views.browser import Browser
 from cockpit.views.cameras import ASPECT, CameraPose, camera_pose
@@ -18,12 +19,16 @@ from cockpit.views.ghost import checked_joints
 from cockpit.views.inputs import SceneSite, SnapshotSource
 from cockpit.views.opening import open_server
 from cockpit.views.scene import Scene
+from cockpit.views.stage_nodes import SHOWN
 from cockpit.views.zone import EXACT, ZONE_KINDS
 
 RATE = 25.0  # updates a second while somebody looks
 IDLE_RATE = 2.0  # while nobody does
 LOST_AFTER = 0.5  # [s] without a snapshot until nothing in the scene counts as known
+STAGES_ASKED = 6.0  # [s] for which stages are shown; a page asks again while it shows them
 FOLLOW_TIME = 0.35  # [s] in which the following camera makes up most of its lag
+
+Stages = Callable[[], StagedScan | None]
 
 
 def start(
@@ -31,9 +36,12 @@ def start(
     source: SnapshotSource,
     own: str | None = None,
     clock: Callable[[], float] = time.monotonic,
+    stages: Stages = lambda: None,
 ) -> View:
-    """Open the scene of a site and keep it current until `stop`. own: the first own machine."""
-    return View(open_server(), site, source, own or next(iter(site.machines)), clock)
+    """Open the scene of a site and keep it current until `stop`. own: the first own machine;
+    stages: the newest of detection, asked for while somebody looks at them.
+    """
+    return View(open_server(), site, source, own or next(iter(site.machines)), clock, stages)
 
 
 class View:
@@ -50,11 +58,13 @@ class View:
         source: SnapshotSource,
         own: str,
         clock: Callable[[], float],
+        stages: Stages = lambda: None,
     ) -> None:
         self._server = server
         self._site = site
         self._source = source
         self._clock = clock
+        self._stages = stages
         self._lock = threading.RLock()
         self._own = own
         self._camera = "site"
@@ -111,6 +121,21 @@ class View:
             for browser in self._of(page):
                 browser.zone_kind = kind
         self._draw_own_now()
+
+    def set_stages(self, shown: Iterable[str], page: str | None = None) -> None:
+        """Which stages of detection are drawn for the next STAGES_ASKED seconds; none of none.
+
+        page: without one, in all browsers there are now. Raises ValueError for what cannot be
+        shown.
+        """
+        wanted = frozenset(shown)
+        if unknown := sorted(wanted - set(SHOWN)):
+            raise ValueError(f'no stage "{unknown[0]}"; there are {", ".join(SHOWN)}')
+        until = self._clock() + STAGES_ASKED
+        with self._lock:
+            new = [browser.show_stages(wanted, until) for browser in self._of(page)]
+        if any(new):
+            self._draw_own_now()
 
     def set_ghost(
         self,
@@ -197,9 +222,13 @@ class View:
 
     def _draw_own(self, snapshot: Snapshot, now: float, lost: float) -> None:
         with self._lock:
-            for browser in self._of(None):
+            browsers = self._of(None)
+            looked = any(browser.looks_at_stages(now) for browser in browsers)
+            stages = self._stages() if looked else None
+            for browser in browsers:
                 try:
                     browser.update(snapshot, self._source, self._scene.ground, now, lost)
+                    browser.update_stages(stages, now)
                 except RuntimeError:
                     # Its window was closed meanwhile, and viser has removed its nodes. Should the
                     # window still be there after all, the next turn makes them anew.

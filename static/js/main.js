@@ -25,6 +25,7 @@ import { trends } from "./plots/trends.js";
 import * as along from "./plots/along.js";
 import * as people from "./plots/people.js";
 import * as status from "./people/status.js";
+import * as stages from "./people/stages.js";
 import { timeline } from "./plots/timeline.js";
 import * as player from "./player.js";
 import * as session from "./session.js";
@@ -152,6 +153,7 @@ const redrawTrends = () => Object.assign(plots.trends, { dirty: true, last: -Inf
 along.startAlong(socket.send, redrawTrends);
 people.startPeople(redrawTrends);
 status.startStatus();
+stages.startStages(socket.send);
 gauge.startGauge();
 drive.startDriving(socket.send);
 
@@ -187,6 +189,7 @@ function tick() {
   along.update();
   people.update();
   status.update();
+  stages.update();
   sheets.update();
   recording.update();
   drive.update();

@@ -115,6 +115,44 @@ def test_files_named_by_their_times(tmp_path: Path) -> None:
     assert (done.returncode, "in the order of their times" in done.stderr) == (2, True)
 
 
+def test_what_became_of_every_point(tmp_path: Path) -> None:
+    paths, out = walk(tmp_path, "scan{k}.pcd")[3:7], tmp_path / "stages.npz"
+    done = cockpit("detect", *paths, "--stages", str(out), "--json", "--reach", "15")
+    assert done.returncode == 0, done.stderr
+    scans = json.loads(done.stdout)["scans"]
+    with np.load(out) as told:
+        arrays = dict(told)
+    assert list(arrays["files"]) == paths
+    np.testing.assert_allclose(arrays["times"], [0.0, 0.1, 0.2, 0.3])
+    names = list(arrays["stage_names"])
+    assert names == ["outside", "machine", "ground", "object", "left"]
+    for k, scan_ in enumerate(scans):
+        own = arrays["scan"] == k
+        counted = dict(zip(names, np.bincount(arrays["stage"][own], minlength=5), strict=True))
+        stages = scan_["stages"]
+        assert own.sum() == stages["points"]
+        assert counted["outside"] == stages["points"] - stages["near"]
+        assert (counted["ground"], counted["object"]) == (stages["ground"], stages["clustered"])
+        boxes = arrays["boxes"][arrays["box_scan"] == k]
+        assert len(boxes) == len(scan_["objects"]) == (0 if k == 2 else 1)
+        for box, model in zip(boxes, scan_["objects"], strict=True):
+            np.testing.assert_allclose(box[:3], model["position"])
+            np.testing.assert_allclose(box[3:], [model["yaw"], *model["size"]])
+        plane = scan_["plane"]
+        np.testing.assert_allclose(arrays["planes"][k], [*plane["normal"], plane["offset"]])
+        assert list(arrays["origins"][k]) == [0.0, 0.0, 2.0]
+    last = arrays["cluster"] == len(arrays["boxes"]) - 1
+    assert set(arrays["scan"][last]) == {3}
+    middle = arrays["points"][last].mean(axis=0)
+    np.testing.assert_allclose(middle[:2], arrays["boxes"][-1, :2], atol=0.3)
+    done = cockpit("detect", paths[0], "--stages", str(out), "--no-ground")
+    assert done.returncode == 0, done.stderr
+    with np.load(out) as told:
+        assert np.isnan(told["planes"]).all()
+    done = cockpit("detect", paths[0], "--stages", str(tmp_path / "none" / "s.npz"))
+    assert (done.returncode, "cannot be written" in done.stderr) == (2, True)
+
+
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [

@@ -221,3 +221,29 @@ def test_what_is_no_cloud_is_refused_and_counted(running: tuple[PeopleLoop, Wire
     loop = PeopleLoop(CONFIG, wire.take, people_worker(), refused.append)
     loop._hear(Heard("left", "left/points", "points", topic("points"), b"nonsense", 1.0))
     assert refused == ["left/points"]
+
+
+def test_stages_come_while_somebody_looks(running: tuple[PeopleLoop, Wire]) -> None:
+    loop, wire = running
+    wire.people = lambda t: (Person(np.array([5.0, 0.0])), Person(np.array([-4.0, 2.0])))
+    follow(loop, wire, lambda s: len(s.id) > 0, time.monotonic())
+    assert loop.look().reason == "waiting for a scan"  # nobody had looked
+
+    def shown(_: Seen) -> bool:
+        return loop.look().stages is not None
+
+    follow(loop, wire, shown, time.monotonic() + 3.0)  # not old before a slow computer looks
+    told = loop.look()
+    assert told.stages is not None
+    assert told.reason == ""
+    assert len(told.stages.points) <= 8_000
+    assert sum(told.stages.counts) > 8_000
+    for somebody in ([5.0, 0.0], [-4.0, 2.0]):
+        apart = np.linalg.norm(told.stages.objects.center[:, :2] - somebody, axis=1)
+        assert apart.min() < 0.3
+    deadline = time.monotonic() + 20.0  # no more scans come
+    while loop.look().stages is not None and time.monotonic() < deadline:
+        time.sleep(0.05)
+    gone = loop.look()
+    assert gone.stages is None
+    assert gone.reason == f"no scan for {gone.age:.1f} s"

@@ -74,7 +74,8 @@ class TurningLidars:
     def _run(self) -> None:
         self._partners.listen(True)
         on_air: tuple[OnAir[bytes], ...] = ()
-        due, before, parts = time.monotonic(), -np.inf, []
+        due, before = time.monotonic(), -np.inf
+        parts: list[tuple[float, tuple[Turn, ...]]] = []
         while not self._closing.is_set():
             now, state = time.monotonic(), self._state()
             if now >= due:
