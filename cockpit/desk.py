@@ -20,6 +20,7 @@ from backend.pipeline.images import SunParameters
 from backend.pipeline.records import Snapshot
 from backend.safety.partner import Limits
 from backend.safety.people import Watch
+from backend.safety.swing_risk import Boundaries
 from backend.shell.hub import Hub
 from backend.shell.image_loops import ImageLoop
 from backend.shell.image_worker import ImageWorker
@@ -27,6 +28,7 @@ from backend.shell.kinds import ALONG, EXACT, REGIONS, SUN, ZONE, Made, Recipe, 
 from backend.shell.recent import Recent
 from backend.site.bodies import site_bodies
 from backend.site.site import Site
+from backend.site.tables import People
 from backend.spatial.types import Array
 
 if TYPE_CHECKING:
@@ -90,7 +92,17 @@ def make_config(site: Site, models: dict[str, Machine], own: tuple[str, ...], mo
         eta=site.safety.eta,
         mode=mode,
         site=site_bodies(site),
-        people=None if site.watch is None else Watch(**dict(site.watch)),
+        people=None if site.watch is None else _watch(site.watch),
+    )
+
+
+def _watch(table: People) -> Watch:
+    return Watch(
+        slow_below=table.slow_below,
+        stop_below=table.stop_below,
+        walking=table.walking,
+        stale=table.stale,
+        boundaries=Boundaries(table.index, table.ttc),
     )
 
 

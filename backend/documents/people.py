@@ -95,6 +95,13 @@ class PartnerRiskModel(BaseModel):
     level: LevelModel
 
 
+class BoundariesModel(BaseModel):
+    """Where the levels begin on the TTC-x plane: an emergency's, then a warning's."""
+
+    ttc: tuple[float, float] = Field(default=(1.0, 3.0), description="at most [s]")
+    index: tuple[float, float] = Field(default=(1.0, 2.0), description="at most")
+
+
 class PeopleModel(BaseModel):
     """People and objects that LiDARs see. A track near a machine never goes without a word."""
 
@@ -107,6 +114,7 @@ class PeopleModel(BaseModel):
     machines: list[PartnerRiskModel] = Field(
         default_factory=list, description="machines against machines; empty while unknown"
     )
+    boundaries: BoundariesModel = Field(default_factory=BoundariesModel)
 
 
 def index_number(x: float) -> float:

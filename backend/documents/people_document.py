@@ -44,6 +44,10 @@ def people_document(people: People, now: float) -> dict[str, Any]:
         "machines": [
             _partner(risk) for judged in people.judged.values() for risk in judged.partners
         ],
+        "boundaries": {
+            "ttc": list(people.boundaries.ttc),
+            "index": list(people.boundaries.index),
+        },
     }
 
 

@@ -94,10 +94,12 @@ def present(state: PeopleState, watch: Watch, now: float) -> People:
     """Everybody at `now` [s]. Without a recent scan nobody can be told, and it says so."""
     seen = state.seen
     if seen is None:
-        return People("no LiDAR has been heard yet", math.nan)
+        reason = "no LiDAR has been heard yet"
+        return People(reason, math.nan, boundaries=watch.boundaries)
     age = now - seen.time
     reason = "" if age <= watch.stale else f"no LiDAR data for {age:.1f} s"
-    return People(reason, age, state.sensors, carried_on(seen, now), state.lost)
+    tracked = carried_on(seen, now)
+    return People(reason, age, state.sensors, tracked, state.lost, boundaries=watch.boundaries)
 
 
 def carried_on(seen: Seen, now: float) -> Tracked:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from backend.safety.people import Risks
+from backend.safety.swing_risk import Boundaries
 from backend.spatial.types import Array, IntArray
 
 PERSON, OBJECT = "person", "object"
@@ -136,7 +137,7 @@ class Judged:
 class People:
     """Everybody around the machines in this cycle. reason: why that is not known, else empty; age:
     of the newest scan, NaN before the first [s]; sensors: newest of each LiDAR; lost: whose places
-    are still told; judged: by own machine.
+    are still told; judged: by own machine; boundaries: of the levels.
     """
 
     reason: str
@@ -145,3 +146,4 @@ class People:
     tracked: Tracked = NOBODY
     lost: tuple[Missing, ...] = ()
     judged: Mapping[str, Judged] = field(default_factory=dict)
+    boundaries: Boundaries = field(default_factory=Boundaries)

@@ -206,16 +206,29 @@ class People(Table):
     """People are watched for, by the LiDARs of the site's machines. slow_below, stop_below:
     distances of people to machines at which motion towards them begins to slow and stops [m];
     walking: speed at which anybody may begin to come nearer [m/s]; stale: without a scan for so
-    long people are unknown, and nothing moves [s].
+    long people are unknown, and nothing moves [s]; ttc, index: where an emergency and where a
+    warning begins, as times to collision of a swing [s] and as warning indices.
     """
 
     slow_below: Positive = 2.0
     stop_below: NotNegative = 0.6
     walking: Annotated[float, Field(ge=0.0, le=10.0)] = 1.0
     stale: Annotated[float, Field(ge=0.15, le=5.0)] = 0.5
+    ttc: tuple[Annotated[float, Field(gt=0.0, le=6.0)], Annotated[float, Field(gt=0.0, le=6.0)]] = (
+        1.0,
+        3.0,
+    )
+    index: tuple[
+        Annotated[float, Field(ge=0.0, le=4.0)], Annotated[float, Field(ge=0.0, le=4.0)]
+    ] = (1.0, 2.0)
 
     @model_validator(mode="after")
     def _ordered(self) -> People:
+        for name, (emergency, warning) in (("ttc", self.ttc), ("index", self.index)):
+            if emergency >= warning:
+                raise ValueError(
+                    f"{name} is {[emergency, warning]}; allowed is an emergency's below a warning's"
+                )
         if self.stop_below >= self.slow_below:
             raise ValueError(
                 f"stop_below is {self.stop_below}; allowed is less than slow_below "

@@ -23,6 +23,7 @@ from backend.pipeline.people_records import (
 )
 from backend.safety.partner import Limits
 from backend.safety.people import Risks
+from backend.safety.swing_risk import Boundaries
 from backend.shell.app.wire import dumps
 from backend.shell.session.people_message import people_message, seen_of
 from backend.shell.session.recorded_people import recorded_people
@@ -105,12 +106,13 @@ def test_what_was_shown_comes_back() -> None:
         tracked,
         (Missing(9, (1.0, 2.0, 0.5), 90.0, 93.0),),
         {"left": Judged(np.array([0.5, 3.0]), bodies, risks, (partner,))},
+        Boundaries(index=(0.5, 3.0), ttc=(0.8, 2.0)),
     )
     document = people_document(people, 100.0)
     again = recorded_people(json.loads(dumps(document)), 100.0, config)
     assert again is not None
     assert people_document(again, 100.0) == document
-    del document["machines"]  # as recorded before machines were judged
+    del document["machines"], document["boundaries"]  # as recorded before these were told
     before = recorded_people(json.loads(dumps(document)), 100.0, config)
     assert before is not None
     assert people_document(before, 100.0)["machines"] == []

@@ -9,6 +9,7 @@ import pytest
 
 from backend.errors import InputError
 from backend.machine.load import load_machine
+from backend.safety.swing_risk import Boundaries
 from backend.site.site import load_site, shipped_sites
 from cockpit.desk import make_config
 
@@ -51,6 +52,8 @@ def test_people_are_read(site_file: Path) -> None:
         "stop_below": 0.8,
         "walking": 1.0,
         "stale": 0.4,
+        "ttc": (1.0, 3.0),
+        "index": (1.0, 2.0),
     }
     assert [person.name for person in site.people] == ["anna", "bert"]
     assert [vehicle.name for vehicle in site.vehicles] == ["truck"]
@@ -73,6 +76,10 @@ def test_without_the_table_nobody_is_watched_for(site_file: Path) -> None:
         ("stale = 0.4", "stale = 0.1", "people.stale is 0.1; allowed is at least 0.15"),
         ("stale = 0.4", "stale = 60.0", "people.stale is 60.0; allowed is at most 5"),
         ("stale = 0.4", "walking = nan", "people.walking is nan"),
+        ("stale = 0.4", "ttc = [3.0, 1.0]", "ttc is [3.0, 1.0]; allowed is an emergency's below"),
+        ("stale = 0.4", "index = [2.0, 2.0]", "index is [2.0, 2.0]; allowed is an emergency's be"),
+        ("stale = 0.4", "ttc = [1.0, 9.0]", "people.ttc[2] is 9.0; allowed is at most 6"),
+        ("stale = 0.4", "ttc = [1.0]", "people.ttc"),
         ("stale = 0.4", "fresh = 0.4", "people.fresh is not a known field; allowed are slow_below"),
         ("seed = 1\n", "", 'person[2]: needs one way to go; allowed is "path", or "seed"'),
         ("seed = 1", "seed = 1\nwithin = [3.0, 5.0]", "within is [3.0, 5.0]; allowed is a ring"),
@@ -98,6 +105,17 @@ def test_mistakes_about_people_are_one_sentence(
 def test_who_watches_needs_a_lidar(site_file: Path) -> None:
     site = load_site(site_file)
     machine = load_machine("mini")
-    assert make_config(site, {"left": machine}, (), "DEMO").people is not None
+    watch = make_config(site, {"left": machine}, (), "DEMO").people
+    assert watch is not None
+    assert (watch.slow_below, watch.stop_below, watch.stale) == (3.0, 0.8, 0.4)
     with pytest.raises(InputError, match=r"no machine has a LiDAR; needed is \[\[lidar\]\]"):
         make_config(site, {"left": replace(machine, lidars=())}, (), "DEMO")
+
+
+def test_boundaries_of_the_levels_are_the_sites(site_file: Path) -> None:
+    text = SITE.replace("stale = 0.4", "ttc = [0.8, 2.0]\nindex = [0.5, 3.0]")
+    site_file.write_text(text, encoding="utf-8")
+    site = load_site(site_file)
+    watch = make_config(site, {"left": load_machine("mini")}, (), "DEMO").people
+    assert watch is not None
+    assert watch.boundaries == Boundaries(index=(0.5, 3.0), ttc=(0.8, 2.0))

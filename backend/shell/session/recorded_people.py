@@ -19,7 +19,7 @@ from backend.pipeline.people_records import (
     Tracked,
 )
 from backend.safety.people import Risks
-from backend.safety.swing_risk import Risk
+from backend.safety.swing_risk import Boundaries, Risk
 from backend.spatial.types import Array
 from backend.tracking.records import Status
 
@@ -33,7 +33,8 @@ def recorded_people(document: Document | None, now: float, config: Config) -> Pe
     if document is None:
         return None
     tracks = list(document["tracks"])
-    partners = list(document.get("machines", ()))  # older recordings have none
+    # Older recordings have none of these.
+    partners, boundaries = list(document.get("machines", ())), document.get("boundaries")
     return People(
         str(document["reason"]),
         _number(document["age"], math.nan),
@@ -62,6 +63,9 @@ def recorded_people(document: Document | None, now: float, config: Config) -> Pe
             for name in config.own
             if any(one["machine"] == name for one in (*document["risks"], *partners))
         },
+        Boundaries(_pair(boundaries["index"]), _pair(boundaries["ttc"]))
+        if boundaries
+        else Boundaries(),
     )
 
 
@@ -141,6 +145,11 @@ def _number(value: Any, unknown: float) -> float:
     if value is None:
         return unknown
     return -math.inf if value == LEAST_INDEX else float(value)
+
+
+def _pair(values: Any) -> tuple[float, float]:
+    first, second = (float(value) for value in values)
+    return first, second
 
 
 def _place(values: Any) -> tuple[float, float, float]:

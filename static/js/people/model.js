@@ -8,7 +8,7 @@ export const AHEAD = 1; // of the foretold places [s]
 const EVERY = 0.09; // between two remembered places [s]
 
 /** Boundaries of the TTC–x plane: emergency up to the first, warning up to the second (Rasul 2021, Fig. 8). */
-export const BOUNDARIES = { index: [1, 2], ttc: [1, 3] };
+export const boundaries = () => people()?.boundaries ?? { index: [1, 2], ttc: [1, 3] };
 const RANK = { SAFE: 0, WARNING: 1, EMERGENCY: 2 };
 /** As the alarm line calls these levels, whose shapes and colours they have. */
 export const ALARM = { WARNING: "SLOW", EMERGENCY: "STOP" };
@@ -53,7 +53,8 @@ export const worst = () => tracks().reduce((most, { id }) => (RANK[level(id)] > 
 
 /** The level of a place on the TTC–x plane. */
 export function region(ttc, index) {
-  const within = (k) => index <= BOUNDARIES.index[k] || ttc <= BOUNDARIES.ttc[k];
+  const at = boundaries();
+  const within = (k) => index <= at.index[k] || ttc <= at.ttc[k];
   return within(0) ? "EMERGENCY" : within(1) ? "WARNING" : "SAFE";
 }
 

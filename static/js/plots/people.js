@@ -9,7 +9,7 @@ import { COLOUR, ORDER, mark, overlap, riskLine, times } from "./plan_people.js"
 import { $, write } from "../words.js";
 import { label as nameOf, machine, state } from "../state.js";
 import { ageText } from "../head.js";
-import { AHEAD, BOUNDARIES, PAST, age, code, history, partners, people, region, risks, tracks, unknown } from "../people/model.js";
+import { AHEAD, PAST, age, boundaries, code, history, partners, people, region, risks, tracks, unknown } from "../people/model.js";
 
 const HALVES = [5, 10, 20, 40, 80, 160]; // of the shown piece of ground [m]
 const TTC = 6; // at which the plane ends [s]
@@ -95,14 +95,16 @@ function axisOverTime(g, place, k, now) {
 
 function plane(g, place, dpr) {
   const t = size("tick");
-  const across = { from: 0, to: TTC, marks: [[0, "0"], [1, "1"], [3, "3"], [TTC, `≥ ${TTC} s`]] };
-  const up = { from: INDEX[0], to: INDEX[1], marks: [[INDEX[0], "≤ −1"], [0, "0"], [1, "1"], [2, "2"], [INDEX[1], "≥ 4"]] };
+  const { ttc: times_, index: indices } = boundaries();
+  const written = (values, end) => values.filter((v) => v < end - 0.5).map((v) => [v, number(v, v % 1 ? 1 : 0)]);
+  const across = { from: 0, to: TTC, marks: [[0, "0"], ...written(times_, TTC), [TTC, `≥ ${TTC} s`]] };
+  const up = { from: INDEX[0], to: INDEX[1], marks: [[INDEX[0], "≤ −1"], ...written([...new Set([0, ...indices])], INDEX[1]), [INDEX[1], "≥ 4"]] };
   const chart = frame(g, place, across, up, `x over TTC, ${nameOf(state.own)}`, "x", 2.5);
   const { box, x, y } = chart;
   const area = (what, k) => {
     g.beginPath();
     g.moveTo(box.left, box.top);
-    for (const [u, v] of [[BOUNDARIES.ttc[k], INDEX[1]], [BOUNDARIES.ttc[k], BOUNDARIES.index[k]], [TTC, BOUNDARIES.index[k]], [TTC, INDEX[0]]]) g.lineTo(x(u), y(v));
+    for (const [u, v] of [[times_[k], INDEX[1]], [times_[k], indices[k]], [TTC, indices[k]], [TTC, INDEX[0]]]) g.lineTo(x(u), y(v));
     g.lineTo(box.left, box.bottom);
     g.closePath();
     g.fillStyle = C.free;
@@ -111,11 +113,11 @@ function plane(g, place, dpr) {
     g.fill();
     g.fillStyle = hatch(g, COLOUR[what], dpr, 0.22, what === "WARNING" ? "/" : "x");
     g.fill();
-    for (const [a, b] of [[[BOUNDARIES.ttc[k], INDEX[1]], [BOUNDARIES.ttc[k], BOUNDARIES.index[k]]], [[BOUNDARIES.ttc[k], BOUNDARIES.index[k]], [TTC, BOUNDARIES.index[k]]]]) segment(g, x(a[0]), y(a[1]), x(b[0]), y(b[1]), COLOUR[what], 1.5);
+    for (const [a, b] of [[[times_[k], INDEX[1]], [times_[k], indices[k]]], [[times_[k], indices[k]], [TTC, indices[k]]]]) segment(g, x(a[0]), y(a[1]), x(b[0]), y(b[1]), COLOUR[what], 1.5);
   };
   area("WARNING", 1);
   area("EMERGENCY", 0);
-  const names = [["SAFE", 3, 2], ["WARNING", 3, 1], ["EMERGENCY", 1, INDEX[0]]];
+  const names = [["SAFE", times_[1], indices[1]], ["WARNING", times_[1], indices[0]], ["EMERGENCY", times_[0], INDEX[0]]];
   for (const [what, u, v] of names) fit(g, [what], x(u) + 4, y(v) - 3, box.right - x(u) - 6, { colour: COLOUR[what], weight: 600, halo: true });
   if (unknown()) {
     fit(g, [`? ${unknown()}`, "? unknown"], box.left + 4, box.top + 3, box.right - box.left - 8, { base: "top", colour: C.unknown, weight: 700, halo: true });
