@@ -27,6 +27,10 @@ def detect(
     ground: Annotated[
         bool, typer.Option(help="Look for the ground and take it out; or there is none.")
     ] = True,
+    ground_by: Annotated[
+        str,
+        typer.Option(help='How the ground is looked for: msac, or "scikit-learn" (an extra).'),
+    ] = "msac",
     link: Annotated[
         float, typer.Option(help="Points nearer than this are one object, 0.1 to 2 m.")
     ] = 0.4,
@@ -47,4 +51,4 @@ def detect(
     from cockpit.detect import Times, run_detect
 
     times = Times(period, stamped)
-    run_detect(clouds, json_, out, ground, link, origin, reach, times, stages)
+    run_detect(clouds, json_, out, ground, link, origin, reach, times, stages, ground_by)

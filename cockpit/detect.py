@@ -21,6 +21,7 @@ from backend.errors import InputError
 from backend.perception.cloud import read_cloud
 from backend.perception.cloud_columns import Cloud
 from backend.perception.detect import Settings, Stages, detect, detect_above
+from backend.perception.ground_library import find_ground_by_library
 from backend.shell.app.wire import dumps
 from backend.spatial.boxes import NO_BOXES
 from backend.spatial.types import Array
@@ -29,6 +30,8 @@ from cockpit.detect_stages import write as write_stages
 
 COLUMNS = ("time", "x", "y", "z", "yaw", "length", "width", "height")
 """Of the CSV file, as `cockpit track` reads it."""
+MSAC, LIBRARY = "msac", "scikit-learn"
+"""Ways to look for the ground: our own, and a library's."""
 MOST = 60  # objects in words; --json has all
 
 
@@ -75,16 +78,19 @@ def run_detect(
     reach: float,
     times: Times,
     stages: Path | None = None,
+    ground_by: str = MSAC,
 ) -> None:
     """Prints what is in each file; writes the CSV and what became of every point. Raises
     InputError.
     """
+    if ground_by not in (MSAC, LIBRARY):
+        raise InputError(f"--ground-by {ground_by}: allowed are {MSAC} and {LIBRARY}.")
     settings = Settings(link=link, reach=reach)
     place = _place(origin) if origin else None
     stamps = times.of(paths)
     scans, staged = [], []
     for path, time in zip(paths, stamps, strict=True):
-        scan, one = scan_of(path, time, place, ground, settings)
+        scan, one = scan_of(path, time, place, ground, settings, ground_by)
         scans.append(scan)
         if stages is not None:
             staged.append(one)
@@ -99,7 +105,12 @@ def run_detect(
 
 
 def scan_of(
-    path: Path, time: float, origin: Array | None, ground: bool, settings: Settings
+    path: Path,
+    time: float,
+    origin: Array | None,
+    ground: bool,
+    settings: Settings,
+    ground_by: str = MSAC,
 ) -> tuple[ScanModel, StagedFile]:
     """What is in one file, and what became of its points. Raises InputError."""
     try:
@@ -108,10 +119,22 @@ def scan_of(
         raise InputError(f"{path}: cannot be read ({error.strerror or error}).") from None
     cloud = read_cloud(content, str(path))
     place = cloud.origin if origin is None else origin
-    find = detect if ground else detect_above
-    found = find(cloud.points, place, NO_BOXES, settings)
+    if not ground:
+        found = detect_above(cloud.points, place, NO_BOXES, settings)
+    elif ground_by == LIBRARY:
+        near = _near(cloud.points, place, settings)
+        plane = find_ground_by_library(near, settings.tolerance, where=str(path))
+        found = detect(cloud.points, place, NO_BOXES, settings, plane)
+    else:
+        found = detect(cloud.points, place, NO_BOXES, settings)
     scan = _scan(str(path), time, cloud, place, found, ground, settings)
     return scan, StagedFile(str(path), time, cloud.points, place, found, ground)
+
+
+def _near(points: Array, origin: Array, settings: Settings) -> Array:
+    """Points in which the ground is looked for."""
+    finite = points[np.isfinite(points).all(axis=1)]
+    return np.asarray(finite[np.hypot(*(finite - origin)[:, :2].T) <= settings.reach], dtype=float)
 
 
 def rows_of(scan: ScanModel) -> Iterator[list[str]]:

@@ -69,6 +69,7 @@ LIBRARIES: dict[str, str | tuple[str, ...]] = {
     "cantools": ("backend.shell.session", "backend.shell.agent"),
     "lxml": "backend.gauge",
     "ifcopenshell": "backend.gauge",
+    "sklearn": "backend.perception",
     "pyarrow": "backend.shell.session",
     "PIL": "backend.shell.sim",
     "fastapi": "backend.shell.app",
@@ -150,8 +151,10 @@ def test_every_import_is_a_declared_dependency(repository: Path) -> None:
         "python-can": "can",
         "python-fcl": "fcl",
         "pyyaml": "yaml",
+        "scikit-learn": "sklearn",
     }
-    names = [*project["dependencies"], *project["optional-dependencies"]["ifc"]]
+    extras = project["optional-dependencies"]
+    names = [*project["dependencies"], *extras["ifc"], *extras["ground"]]
     declared = {aliases.get(name, name).replace("-", "_") for name in names}
     for path in sources():
         for name in imports_of(path):
