@@ -81,6 +81,18 @@ class RiskModel(BaseModel):
     )
 
 
+AreaName = Literal["none", "maximum", "predicted", "current"]
+
+
+class InsideModel(BaseModel):
+    """A track in a working area of a machine, whole box and three standard deviations."""
+
+    id: int = Field(description="of the track")
+    machine: str
+    area: AreaName = Field(description="the narrowest working area that it is in now")
+    area_ahead: AreaName = Field(description="that its place in a second, with 95 %, touches")
+
+
 class PeopleModel(BaseModel):
     """People and objects that LiDARs see. A track near a machine never goes without a word."""
 
@@ -90,6 +102,9 @@ class PeopleModel(BaseModel):
     tracks: list[TrackModel]
     lost: list[LostModel] = Field(description='"last seen here"')
     risks: list[RiskModel] = Field(description="by track and machine; empty while unknown")
+    inside: list[InsideModel] = Field(
+        default_factory=list, description="who is in a working area; empty while unknown"
+    )
 
 
 def index_number(x: float) -> float:

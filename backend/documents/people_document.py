@@ -41,6 +41,15 @@ def people_document(people: People, now: float) -> dict[str, Any]:
             for machine, judged in people.judged.items()
             for k in range(len(judged.distance))
         ],
+        "inside": [
+            {
+                "id": one.id,
+                "machine": one.machine,
+                "area": one.now.name.lower(),
+                "area_ahead": one.ahead.name.lower(),
+            }
+            for one in people.inside
+        ],
     }
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from backend.safety.people import Risks
+from backend.safety.working_area import Within
 from backend.spatial.types import Array, IntArray
 
 PERSON, OBJECT = "person", "object"
@@ -112,10 +113,22 @@ class Judged:
 
 
 @dataclass(frozen=True)
+class Inside:
+    """A track in a working area: the narrowest that it is in now, and that its place in a second is
+    in, of the same areas.
+    """
+
+    id: int
+    machine: str
+    now: Within
+    ahead: Within
+
+
+@dataclass(frozen=True)
 class People:
     """Everybody around the machines in this cycle. reason: why that is not known, else empty; age:
     of the newest scan, NaN before the first [s]; sensors: newest of each LiDAR; lost: whose places
-    are still told; judged: by own machine.
+    are still told; judged: by own machine; inside: whose working areas who is in.
     """
 
     reason: str
@@ -124,3 +137,4 @@ class People:
     tracked: Tracked = NOBODY
     lost: tuple[Missing, ...] = ()
     judged: Mapping[str, Judged] = field(default_factory=dict)
+    inside: tuple[Inside, ...] = ()

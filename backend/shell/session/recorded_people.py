@@ -10,9 +10,10 @@ import numpy as np
 
 from backend.documents.people import LEAST_INDEX
 from backend.pipeline.config import Config
-from backend.pipeline.people_records import Judged, Missing, People, Sensor, Tracked
+from backend.pipeline.people_records import Inside, Judged, Missing, People, Sensor, Tracked
 from backend.safety.people import Risks
 from backend.safety.swing_risk import Risk
+from backend.safety.working_area import Within
 from backend.spatial.types import Array
 from backend.tracking.records import Status
 
@@ -54,6 +55,15 @@ def recorded_people(document: Document | None, now: float, config: Config) -> Pe
             for name in config.own
             if any(one["machine"] == name for one in document["risks"])
         },
+        tuple(
+            Inside(
+                int(one["id"]),
+                str(one["machine"]),
+                Within[str(one["area"]).upper()],
+                Within[str(one["area_ahead"]).upper()],
+            )
+            for one in document.get("inside", ())
+        ),
     )
 
 
