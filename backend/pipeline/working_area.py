@@ -59,19 +59,21 @@ def inside(people: People, machines: Mapping[str, MachineState]) -> tuple[Inside
     if people.reason or not len(tracked):
         return ()
     half = np.hypot(*boxes_of(tracked).half_extents[:, :2].T)
-    place = tracked.position[:, :2], tracked.ahead
-    radius = (
-        half + SIGMAS * np.minimum(tracked.sigma, 1.0),
-        half + CONFIDENT * np.minimum(largest(tracked.ahead_cov), 1.0),
+    places = np.concatenate([tracked.position[:, :2], tracked.ahead])
+    radius = np.concatenate(
+        [
+            half + SIGMAS * np.minimum(tracked.sigma, 1.0),
+            half + CONFIDENT * np.minimum(largest(tracked.ahead_cov), 1.0),
+        ]
     )
     found: list[Inside] = []
     for name, state in machines.items():
         if state.area is None or state.area.reason:
             continue
-        now, ahead = (within(state.area, *one) for one in zip(place, radius, strict=True))
-        either = np.flatnonzero((now > Within.NONE) | (ahead > Within.NONE))
+        kinds = within(state.area, places, radius).reshape(2, -1).T.tolist()
         found += [
-            Inside(int(tracked.id[k]), name, Within(now[k]), Within(ahead[k]))
-            for k in either.tolist()
+            Inside(int(tracked.id[k]), name, Within(now), Within(ahead))
+            for k, (now, ahead) in enumerate(kinds)
+            if now or ahead
         ]
     return tuple(found)

@@ -16,8 +16,7 @@ import numpy as np
 
 from backend.machine.arm_extent import extent_of
 from backend.machine.model import Machine
-from backend.safety.working_area_kernel import FULL, intervals, sectors
-from backend.spatial.angles import wrap
+from backend.safety.working_area_kernel import FULL, intervals, narrowest, sectors
 from backend.spatial.types import Array, BoolArray, IntArray
 
 
@@ -138,32 +137,22 @@ def touches(area: Area, places: Array, radius: Array) -> BoolArray:
     """(k,) whether discs on the ground touch the area. places: (k, 2) from the swing centre [m];
     radius: (k,) [m].
     """
-    r = np.hypot(places[:, 0], places[:, 1])
-    half = 0.5 * (area.end - area.start)
-    off = wrap(np.arctan2(places[:, 1], places[:, 0]) - area.start - half)
-    beside = np.maximum(np.abs(off) - half, 0.0)
-    along = np.clip(r * np.cos(np.minimum(beside, 0.5 * np.pi)), 0.0, area.reach)
-    to_edge = np.hypot(r * np.cos(beside) - along, r * np.sin(beside))
-    gap = np.where(beside > 0.0, to_edge, r - area.reach)
-    return np.asarray(np.minimum(gap, r - area.body) <= radius)
+    return np.asarray(narrowest(_rows(area), np.zeros(2), places, radius) > 0)
 
 
 def within(area: WorkingArea, places: Array, radius: Array) -> IntArray:
     """(k,) `Within` of discs on the ground. places: (k, 2) site frame [m]; radius: (k,) [m]. All
     NONE where the area is not known: `reason` must be told.
     """
-    found = np.zeros(len(places), dtype=np.int64)
-    if area.center is None:
-        return found
-    kinds = (
-        (Within.MAXIMUM, area.maximum),
-        (Within.PREDICTED, area.predicted),
-        (Within.CURRENT, area.current),
-    )
-    for kind, one in kinds:
-        if one is not None:
-            found[touches(one, places - area.center, radius)] = kind
-    return found
+    known = area.maximum, area.predicted, area.current
+    if area.center is None or None in known:
+        return np.zeros(len(places), dtype=np.int64)
+    # In the order of `Within`.
+    return np.asarray(narrowest(_rows(*known), np.array(area.center), places, radius))
+
+
+def _rows(*areas: Area | None) -> Array:
+    return np.array([(a.body, a.reach, a.start, a.end) for a in areas if a is not None])
 
 
 def _area(body: float, reach: float, start: float, end: float) -> Area:

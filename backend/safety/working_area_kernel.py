@@ -126,3 +126,28 @@ def sectors(
             out[row, 1] = max(out[row, 1], half_width(near, far, right + grown, body[row]))
             out[row, 2] = max(out[row, 2], half_width(near, far, left + grown, body[row]))
     return out
+
+
+@njit(cache=True, nogil=True)
+def narrowest(areas: Array, center: Array, places: Array, radius: Array) -> IntArray:
+    """(k,) 1 + the last of the areas that discs on the ground touch, 0 none.
+
+    areas: (a, 4) body, reach, start, end of each [m, rad]; center: (2,), places: (k, 2) in one
+    frame; radius: (k,) [m].
+    """
+    out = np.zeros(len(places), np.int64)
+    for i in range(len(places)):
+        x, y = places[i, 0] - center[0], places[i, 1] - center[1]
+        r, angle = math.hypot(x, y), math.atan2(y, x)
+        for k in range(len(areas)):
+            body, reach, start, end = areas[k]
+            half = 0.5 * (end - start)
+            beside = (angle - start - half + math.pi) % FULL - math.pi
+            beside = max(abs(beside) - half, 0.0)
+            along = 0.0
+            if beside < 0.5 * math.pi:
+                along = min(r * math.cos(beside), reach)
+            gap = math.hypot(r * math.cos(beside) - along, r * math.sin(beside))
+            if min(gap, r - body) <= radius[i]:
+                out[i] = k + 1
+    return out
