@@ -36,6 +36,7 @@ from backend.safety.limits import Delay
 from backend.safety.record import Concern, Level
 from backend.safety.swing_arcs import Objects, judge_swing
 from backend.safety.swing_risk import Boundaries, Swing
+from backend.safety.working_area import Stand, within, working_area
 from backend.site.named_bodies import SiteBodies
 from backend.spatial import rotation, transform
 from backend.spatial.boxes import Boxes
@@ -66,6 +67,8 @@ def compile_kernels() -> None:
     )
     wish = Wish(machine.max_velocity, np.ones(2))
     limit("own", machine, q, wish, (concern,), Delay(0.1, 0.2), open_latch(machine), 0.0)
+    area = working_area(machine, Stand(q, q, *(0.0,) * 2, q[:2], *(0.0,) * 6), 1.0)
+    within(area, np.zeros((1, 2)), np.zeros(1))
     rehearse(machine)
     empty = Watched()
     cloud = Cloud("own", "lidar", 0.0, _GROUND, np.eye(4), near)

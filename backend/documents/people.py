@@ -102,6 +102,18 @@ class BoundariesModel(BaseModel):
     index: tuple[float, float] = Field(default=(1.0, 2.0), description="at most")
 
 
+AreaName = Literal["none", "maximum", "predicted", "current"]
+
+
+class InsideModel(BaseModel):
+    """A track in a working area of a machine, whole box and three standard deviations."""
+
+    id: int = Field(description="of the track")
+    machine: str
+    area: AreaName = Field(description="the narrowest working area that it is in now")
+    area_ahead: AreaName = Field(description="that its place in a second, with 95 %, touches")
+
+
 class PeopleModel(BaseModel):
     """People and objects that LiDARs see. A track near a machine never goes without a word."""
 
@@ -115,6 +127,9 @@ class PeopleModel(BaseModel):
         default_factory=list, description="machines against machines; empty while unknown"
     )
     boundaries: BoundariesModel = Field(default_factory=BoundariesModel)
+    inside: list[InsideModel] = Field(
+        default_factory=list, description="who is in a working area; empty while unknown"
+    )
 
 
 def index_number(x: float) -> float:

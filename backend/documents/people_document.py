@@ -48,6 +48,15 @@ def people_document(people: People, now: float) -> dict[str, Any]:
             "ttc": list(people.boundaries.ttc),
             "index": list(people.boundaries.index),
         },
+        "inside": [
+            {
+                "id": one.id,
+                "machine": one.machine,
+                "area": one.now.name.lower(),
+                "area_ahead": one.ahead.name.lower(),
+            }
+            for one in people.inside
+        ],
     }
 
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from backend.documents.people_document import people_document
+from backend.documents.working_area import working_area_document
 from backend.machine.model import Machine
 from backend.machine.outline import outlines_of
 from backend.machine.sun_map import sun_angles
@@ -98,6 +99,7 @@ def machine_document(state: MachineState, machine: Machine, config: Config) -> d
         "age_source": _age_source(state),
         "fix": pose.fix.value,
         "max_reach": machine.max_reach,
+        "working_area": working_area_document(state.area),
     }
     if state.body is not None:
         outlines = outlines_of(machine, state.body.boxes)

@@ -9,6 +9,7 @@ import numpy as np
 
 from backend.safety.people import Risks
 from backend.safety.swing_risk import Boundaries
+from backend.safety.working_area import Within
 from backend.spatial.types import Array, IntArray
 
 PERSON, OBJECT = "person", "object"
@@ -134,10 +135,23 @@ class Judged:
 
 
 @dataclass(frozen=True)
+class Inside:
+    """A track in a working area: the narrowest that it is in now, and that its place in a second is
+    in, of the same areas.
+    """
+
+    id: int
+    machine: str
+    now: Within
+    ahead: Within
+
+
+@dataclass(frozen=True)
 class People:
     """Everybody around the machines in this cycle. reason: why that is not known, else empty; age:
     of the newest scan, NaN before the first [s]; sensors: newest of each LiDAR; lost: whose places
-    are still told; judged: by own machine; boundaries: of the levels.
+    are still told; judged: by own machine; boundaries: of the levels; inside: whose working areas
+    who is in.
     """
 
     reason: str
@@ -147,3 +161,4 @@ class People:
     lost: tuple[Missing, ...] = ()
     judged: Mapping[str, Judged] = field(default_factory=dict)
     boundaries: Boundaries = field(default_factory=Boundaries)
+    inside: tuple[Inside, ...] = ()

@@ -11,6 +11,7 @@ from backend.fusion.samples import Sample
 from backend.pipeline.people_records import People, Seen
 from backend.safety.alarms import Alarm
 from backend.safety.record import Concern
+from backend.safety.working_area import WorkingArea
 from backend.site.gauge_choice import NO_CHOICE, GaugeChoice
 from backend.spatial.boxes import Boxes
 from backend.spatial.types import Array
@@ -73,11 +74,14 @@ class Body3D:
 
 @dataclass(frozen=True)
 class MachineState:
-    """pose: fused; body: placed (None before the first complete pose); eta: inflation [m]."""
+    """pose: fused; body: placed (None before the first complete pose); eta: inflation [m]; area:
+    where it works, None where nobody worked that out (recordings of before).
+    """
 
     pose: FusedPose
     body: Body3D | None
     eta: float
+    area: WorkingArea | None = None
 
 
 @dataclass(frozen=True)

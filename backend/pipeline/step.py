@@ -38,6 +38,7 @@ from backend.pipeline.records import (
     Snapshot,
 )
 from backend.pipeline.site_concern import site_concern
+from backend.pipeline.working_area import area_of, inside
 from backend.pipeline.working_gauge import following as gauge_now
 from backend.pipeline.working_gauge import site_of
 from backend.safety import alarms, partner
@@ -74,7 +75,7 @@ def step(state: State, inputs: Inputs, now: float, config: Config) -> tuple[Stat
         ((rig, streams[name]) for name, rig in state.rigs.items()), now, state.common_time
     )
     machines = {
-        name: _machine_state(fuse(rig, streams[name], now, common), rig, config)
+        name: _machine_state(fuse(rig, streams[name], now, common), rig, now, config)
         for name, rig in state.rigs.items()
     }
     gauge = gauge_now(state.gauge, inputs.gauge, machines, config)
@@ -150,9 +151,14 @@ def _sorted_in(state: State, samples: Iterable[Sample]) -> tuple[dict[str, Strea
     return streams, strangers
 
 
-def _machine_state(pose: FusedPose, rig: Rig, config: Config) -> MachineState:
+def _machine_state(pose: FusedPose, rig: Rig, now: float, config: Config) -> MachineState:
     body = _placed(pose, rig)
-    return MachineState(pose=pose, body=body, eta=eta(rig.machine, pose, config.eta))
+    return MachineState(
+        pose=pose,
+        body=body,
+        eta=eta(rig.machine, pose, config.eta),
+        area=area_of(rig.machine, pose, body, now),
+    )
 
 
 def _placed(pose: FusedPose, rig: Rig) -> Body3D | None:
@@ -203,7 +209,8 @@ def _people(
             judged[name] = why
     if not memory.judged:
         memory = replace(memory, judged=judged, judged_at=now)
-    return memory, replace(here, judged=judged), tuple(concerns)
+    here = replace(here, judged=judged, inside=inside(here, machines))
+    return memory, here, tuple(concerns)
 
 
 def _notices(

@@ -13,6 +13,7 @@ from people_frames import PERIOD, PeopleFeed, risk
 from PIL import Image
 from playwright.sync_api import Browser
 from test_page_exact import CLIPPED, OUTSIDE, SIZES
+from test_page_offline import machine
 
 ALARM = {
     "level": "STOP",
@@ -77,6 +78,46 @@ def test_the_plan_shows_who_is_where_and_who_was_lost(feed: PeopleFeed) -> None:
     assert "1.6 × 1.0 × 1.2 m" in told
     assert "SAFE · LEFT bucket 1.1 m" in told
     assert "TTC 5.0 s, x 3.1; in 1 s TTC none, x no braking" in told
+
+
+def area(reach: float, start: float, end: float) -> dict[str, float]:
+    return {"body": 1.1, "reach": reach, "start": start, "end": end}
+
+
+@pytest.mark.parametrize("size", SIZES, ids=lambda s: f"{s[0]}x{s[1]}")
+def test_the_plan_shows_working_areas_and_who_is_in_them(
+    browser: Browser, size: tuple[int, int], artifacts: Path
+) -> None:
+    feed = PeopleFeed(browser, *size)
+    known = {
+        "reason": "",
+        "tail": 1.1,
+        "center": [0.0, 0.0],
+        "current": area(3.3, 0.35, 0.7),
+        "predicted": area(3.9, -0.3, 0.9),
+        "maximum": area(4.4, -np.pi, np.pi),
+    }
+    nothing = dict.fromkeys(("center", "current", "predicted", "maximum"))
+    old = {"reason": "position is 0.6 s old", "tail": 1.1, **nothing}
+    machines = {
+        "left": {**machine("LEFT", 0.0), "working_area": known},
+        "right": {**machine("RIGHT", 7.0), "working_area": old},
+    }
+    one = {"id": 7, "machine": "left", "area": "predicted", "area_ahead": "current"}
+    far = {"id": 8, "machine": "left", "area": "none", "area_ahead": "maximum"}
+    feed.said = {"inside": [one, far]}
+    said = "P7 in LEFT's predicted working area, in 1 s in its working area"
+    feed.send(lambda: words(feed).endswith(f"s old; {said}"), machines=machines)
+    assert feed.shown("plan")["areas"] == {"left": "", "right": "position is 0.6 s old"}
+    feed.page.locator("#plan").screenshot(path=artifacts / f"people-areas-{size[0]}.png")
+    assert feed.page.evaluate(CLIPPED) == []
+    feed.said = {"inside": [one], "reason": "no LiDAR data for 0.8 s", "age": 0.8}
+    feed.send(lambda: "unknown" in words(feed), machines=machines)
+    assert "working area" not in words(feed)
+    feed.said = None
+    feed.send(lambda: feed.shown("plan")["areas"] is None, machines=machines)
+    assert feed.errors == []
+    feed.page.close()
 
 
 def test_time_and_plane_show_what_the_snapshot_says(feed: PeopleFeed) -> None:

@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from backend.documents.people import PeopleModel
+from backend.documents.working_area import WorkingAreaModel
 from backend.shell.app.driving_models import DrivingModel
 
 Vector = list[float]
@@ -45,6 +46,9 @@ class MachineModel(BaseModel):
     age_source: str = Field(description="offset (round-trip estimate) or arrival")
     fix: str = Field(description="quality of the GNSS position")
     max_reach: float = Field(description="swing axis to bucket tip, joint limits ignored [m]")
+    working_area: WorkingAreaModel | None = Field(
+        None, description="the ground it works over; null in recordings of before"
+    )
     swing_center: Vector | None = Field(None, description="site frame [m]")
     end_point: Vector | None = Field(None, description="bucket tip, site frame [m]")
     azimuth: Unknown = Field(None, description="of the arm, from grid east [rad]")

@@ -11,6 +11,7 @@ import numpy as np
 from backend.documents.people import LEAST_INDEX
 from backend.pipeline.config import Config
 from backend.pipeline.people_records import (
+    Inside,
     Judged,
     Missing,
     PartnerRisk,
@@ -20,6 +21,7 @@ from backend.pipeline.people_records import (
 )
 from backend.safety.people import Risks
 from backend.safety.swing_risk import Boundaries, Risk
+from backend.safety.working_area import Within
 from backend.spatial.types import Array
 from backend.tracking.records import Status
 
@@ -66,6 +68,15 @@ def recorded_people(document: Document | None, now: float, config: Config) -> Pe
         Boundaries(_pair(boundaries["index"]), _pair(boundaries["ttc"]))
         if boundaries
         else Boundaries(),
+        tuple(
+            Inside(
+                int(one["id"]),
+                str(one["machine"]),
+                Within[str(one["area"]).upper()],
+                Within[str(one["area_ahead"]).upper()],
+            )
+            for one in document.get("inside", ())
+        ),
     )
 
 

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from backend.documents.working_area import read_working_area
 from backend.fusion.pose import FusedPose, StreamStatus, Validity
 from backend.fusion.samples import Fix
 from backend.machine.model import Machine
@@ -150,7 +151,8 @@ def _machine(name: str, one: Document, machine: Machine, state_time: float) -> M
     body = None
     if one.get("end_point") is not None:
         body = place(machine, pose.joints, base_transform(pose))
-    return MachineState(pose=pose, body=body, eta=_number(one["eta"], math.inf))
+    area = read_working_area(one.get("working_area"))
+    return MachineState(pose=pose, body=body, eta=_number(one["eta"], math.inf), area=area)
 
 
 def _pair(one: Document) -> PairDistance:

@@ -1,6 +1,6 @@
 // People and objects that LiDARs see: what the snapshot says of them, and where they were.
 
-import { names, state, waited } from "../state.js";
+import { label, names, state, waited } from "../state.js";
 
 export const OLD = 0.5; // of the newest scan: older, and nobody counts as seen [s]
 export const PAST = 20; // that is remembered [s]
@@ -45,6 +45,29 @@ export function risks(id, machine = null) {
 
 /** What the swing of a machine is to the other machines; nothing while people are unknown. */
 export const partners = (machine) => (unknown() ? [] : (people()?.machines ?? []).filter((r) => r.machine === machine).map(read));
+const AREAS = ["none", "maximum", "predicted", "current"];
+const AREA_WORDS = { current: "working area", predicted: "predicted working area", maximum: "largest working area" };
+
+/** Whose working areas a track is in, or will be in a second, the narrowest first; nothing while unknown. */
+export function inside(id) {
+  if (unknown()) return [];
+  const found = (people()?.inside ?? []).filter((one) => one.id === id);
+  return found.sort((a, b) => AREAS.indexOf(b.area) - AREAS.indexOf(a.area) || AREAS.indexOf(b.area_ahead) - AREAS.indexOf(a.area_ahead));
+}
+
+/** One of these in words: "in LEFT's predicted working area, in 1 s in its working area". */
+export function areaWords({ machine, area, area_ahead: ahead }) {
+  const whose = `${label(machine)}'s`;
+  const now = area === "none" ? "" : `in ${whose} ${AREA_WORDS[area]}`;
+  if (AREAS.indexOf(ahead) <= AREAS.indexOf(area)) return now;
+  return now ? `${now}, in 1 s in its ${AREA_WORDS[ahead]}` : `in 1 s in ${whose} ${AREA_WORDS[ahead]}`;
+}
+
+/** Who is in a working area as it is now or is predicted to be: "P7 in LEFT's predicted working area". */
+export function insideWords() {
+  const near = ({ area, area_ahead: ahead }) => Math.max(AREAS.indexOf(area), AREAS.indexOf(ahead)) >= 2;
+  return tracks().filter(({ status }) => status !== "tentative").flatMap((track) => inside(track.id).filter(near).map((one) => `${code(track)} ${areaWords(one)}`));
+}
 
 export const level = (id) => risks(id)[0]?.level ?? "SAFE";
 

@@ -4,7 +4,9 @@ import { $, glyph, slowText } from "../words.js";
 import { seconds } from "../axis.js";
 import { lampShape } from "../glyphs.js";
 import { widest } from "../headers.js";
-import { ALARM, age, lost, people, tracks, unknown, worst } from "./model.js";
+import { ALARM, age, insideWords, lost, people, tracks, unknown, worst } from "./model.js";
+
+const MOST = 3; // who is in working areas, in words
 
 let words, shape = "";
 
@@ -21,7 +23,9 @@ function texts() {
   const persons = seen.filter(({ kind }) => kind === "person").length;
   const more = [[seen.length - persons, "object"], [lost().length, "lost"]].filter(([n]) => n);
   const rest = more.map(([n, word]) => `, ${n} ${word}${word === "object" && n > 1 ? "s" : ""}`).join("");
-  return [`People: ${persons} seen${rest}, ${seconds(age())} old`, `People: ${persons} seen, ${seconds(age())} old`, `People: ${persons} seen`, `P ${persons}`];
+  const all = insideWords(), areas = all.slice(0, MOST).map((words) => `; ${words}`).join("") + (all.length > MOST ? `; +${all.length - MOST}` : "");
+  const full = `People: ${persons} seen${rest}, ${seconds(age())} old`;
+  return [...(areas ? [full + areas] : []), full, `People: ${persons} seen, ${seconds(age())} old`, `People: ${persons} seen`, `P ${persons}`];
 }
 
 /** Up to what stands to the right of the words [px]; its age can grow by a glyph. */

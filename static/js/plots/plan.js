@@ -10,10 +10,12 @@ import { image, imageAge, imageStale, label as nameOf, machine, names, pair, rep
 import { shownZone } from "../view.js";
 import { surface } from "../surface.js";
 import {
-  base, chart, circles, drawZone, exitArrow, gauge, gridLines, gridText, iso, nearestLine, north, obstacles, outlines, wedge, zonePoints,
+  base, chart, drawZone, exitArrow, gauge, gridLines, gridText, iso, nearestLine, north, obstacles, outlines, wedge, zonePoints,
 } from "./plan_layers.js";
 import { drawing, paint as paintDrawing } from "../gauge/drawing.js";
 import { inForce } from "../gauge/model.js";
+import { insideWords } from "../people/model.js";
+import { areaKey, drawAreas, hasAreas, tellAreas } from "./plan_areas.js";
 import { drawPeople, peopleLines, personSwatch } from "./plan_people.js";
 import { distanceText, drawZones, outlineSun, view as zoneView, zoneExit, zoneLegend, zoneLines, zoneNote } from "./plan_zone.js";
 
@@ -47,7 +49,8 @@ function paint(g, width, height, dpr) {
     return { state: { own: state.own, zone: 0 }, age: Infinity, label: "Plan: no position yet" };
   }
   const t = size("tick");
-  box = { left: Math.round(2.2 * t), top: 4, right: width - 4, bottom: height - Math.round(2.9 * t) };
+  const rows = hasAreas() ? 2 : 1; // of the legend
+  box = { left: Math.round(2.2 * t), top: 4, right: width - 4, bottom: height - Math.round((rows > 1 ? 4.2 : 2.9) * t) };
   const px = Math.min(box.right - box.left, box.bottom - box.top) / view.width;
   const cx = (box.left + box.right) / 2, cy = (box.top + box.bottom) / 2;
   const turn = view.tracksUp ? Math.PI / 2 - (own.yaw ?? 0) : 0;
@@ -80,7 +83,7 @@ function paint(g, width, height, dpr) {
   if (!exact) drawZone(g, zone, dpr, stale ? C.stale : C.partner);
   else if (how === "difference") outlineSun(g, zone);
   if (replaying()) playbackMark(g, box);
-  for (const name of names()) circles(g, name);
+  drawAreas(g);
   gauge(g);
   obstacles(g);
   for (const name of names()) if (name !== state.own) outlines(g, name);
@@ -89,29 +92,30 @@ function paint(g, width, height, dpr) {
   const exit = exact ? zoneExit(g, exact, own) : exitArrow(g, own, zone);
   const nearest = nearestLine(g);
   for (const name of names()) base(g, name);
+  const areas = tellAreas(g);
   const seen = drawPeople(g);
   north(g, turn);
   if (exact) zoneNote(g, exact, stale);
   paintDrawing(g);
   g.restore();
   if (!view.tracksUp) gridText(g, grid, height, t);
+  if (rows > 1) legend(g, 6, height - 1.95 * t, width - 8, areaKey);
   const age = Math.max(snapshotAge(), entry ? imageAge(entry) : 0);
   const staleZone = `zone ${staleText(imageAge(entry))}`;
   legend(g, 6, height - 0.65 * t, width - 8, [
     ...(exact && how === "difference" ? [[swatches.line("#FFFFFF"), "Sun"]] : []),
     ...(exact ? stale ? [[zoneLegend(g, dpr, stale, { as_is: 1 })[0][0], staleZone]] : zoneLegend(g, dpr, stale, zones)
       : [[swatches.area(hatch(g, stale ? C.stale : C.partner, dpr), stale ? C.stale : C.partner), stale ? staleZone : "zone for ✚ (Sun)"]]),
-    [swatches.line(C.text), "reach now"],
-    [swatches.line(C.text, [4, 3], 1.5), "max"],
+    ...(rows > 1 ? [] : [[swatches.line(C.text), "reach now"], [swatches.line(C.text, [4, 3], 1.5), "max"]]),
     ...(seen?.tracks.length ? [[swatches.glyph(personSwatch), "person"]] : []),
   ]);
   return {
     state: {
       own: state.own, partner: state.partner, playback: replaying(), width: view.width, centre: view.centre, up: view.tracksUp ? "tracks" : "north",
-      base: own.position?.slice(0, 2), zone: zone.length, zones, shown: how, zone_stale: stale, exit, nearest, people: seen, gauge: inForce(), machines: names().filter((name) => machine(name)?.outlines).length,
+      base: own.position?.slice(0, 2), zone: zone.length, zones, shown: how, zone_stale: stale, exit, nearest, people: seen, areas, gauge: inForce(), machines: names().filter((name) => machine(name)?.outlines).length,
     },
     age,
-    label: `Plan of ${view.width} m: ${nameOf(state.own)} base at ${own.position_projected ? own.position_projected.slice(0, 2).map((v) => v.toFixed(1)).join(", ") : "unknown"}; nearest distance to ${nameOf(state.partner)} ${nearest === null ? "unknown" : metres(nearest)}${exit ? `; base inside the warning zone by ${metres(exit)}` : ""}${exact ? `; ${distanceText(exact)}` : ""}`,
+    label: `Plan of ${view.width} m: ${nameOf(state.own)} base at ${own.position_projected ? own.position_projected.slice(0, 2).map((v) => v.toFixed(1)).join(", ") : "unknown"}; nearest distance to ${nameOf(state.partner)} ${nearest === null ? "unknown" : metres(nearest)}${exit ? `; base inside the warning zone by ${metres(exit)}` : ""}${exact ? `; ${distanceText(exact)}` : ""}${insideWords().map((words) => `; ${words}`).join("")}`,
   };
 }
 

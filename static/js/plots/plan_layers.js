@@ -90,7 +90,7 @@ export function wedge(g, own) {
   g.fill();
 }
 
-const tint = (name) => (machine(name).validity !== "VALID" ? C.stale : name === state.own ? C.text : C.partnerLine);
+export const tint = (name) => (machine(name).validity !== "VALID" ? C.stale : name === state.own ? C.text : C.partnerLine);
 
 export function circles(g, name) {
   const m = machine(name);

@@ -5,7 +5,7 @@ import { metres, number } from "../axis.js";
 import { fit, label, segment } from "../pen.js";
 import { partName } from "../words.js";
 import { label as nameOf, state } from "../state.js";
-import { age, code, ellipse, heading, history, level, lost, people, risks, tracks, unknown } from "../people/model.js";
+import { age, areaWords, code, ellipse, heading, history, inside, level, lost, people, risks, tracks, unknown } from "../people/model.js";
 import { chart } from "./plan_layers.js";
 
 const TAIL = 3; // s
@@ -198,6 +198,7 @@ export function trackLines(track) {
     `${number(speed, 1)} m/s, ±${number(track.sigma, 2)} m, detected ${number(track.unseen, 1)} s ago`,
     ...(far ? [`in 1 s within ±${number(far.long, 1)} m (95 %)`] : []),
     ...risks(track.id).flatMap(riskLine),
+    ...inside(track.id).map(areaWords),
   ];
 }
 
