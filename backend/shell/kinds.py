@@ -90,8 +90,15 @@ def _makers(
         pairs = ordered_pairs(snapshot, config)
         if kind == ZONE:
             from backend.pipeline.zones import zone_image
+            from backend.pipeline.zones_around import zones_around
 
-            return [partial(zone_image, snapshot, config, *pair) for pair in pairs]
+            return [
+                *(partial(zone_image, snapshot, config, *pair) for pair in pairs),
+                *(
+                    partial(make, snapshot, config, own)
+                    for make, own in zones_around(snapshot, config)
+                ),
+            ]
         return [partial(pair_image, snapshot, config, *pair, recipe.sun) for pair in pairs]
     from backend.pipeline.exact import Cells, own_image, own_machines
 
