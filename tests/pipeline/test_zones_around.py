@@ -12,6 +12,7 @@ from test_people import seen
 from test_step import config, inputs, run
 from test_working_gauge import AHEAD, RAILS
 
+from backend.documents.zone import ZoneFrameHeader
 from backend.pipeline import zones_around
 from backend.pipeline.config import Config
 from backend.pipeline.people import PeopleState, everybody, following, present
@@ -240,6 +241,7 @@ def test_people_who_are_not_known_are_no_free_ground(snapshot: Snapshot, config:
     frame = frame_of(ZONE, image, {})
     assert frame is not None
     header, arrays = decode(frame)
+    ZoneFrameHeader.model_validate(header)
     assert (header["layer"], header["partner"], header["reason"]) == ("people", None, image.reason)
     assert header["variants"] == {}
     assert header["eta"] is None
@@ -273,6 +275,7 @@ def test_every_own_machine_has_a_zone_per_layer(snapshot: Snapshot, config: Conf
         frame = frame_of(ZONE, image, {})
         assert frame is not None
         header, arrays = decode(frame)
+        ZoneFrameHeader.model_validate({k: v for k, v in header.items() if k != "arrays"})
         assert (header["key"], header["layer"]) == (key, image.layer)
         for name, variant in header["variants"].items():
             assert arrays[f"{name}_rings"][:, 0].sum() == len(arrays[name])
