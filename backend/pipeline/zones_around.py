@@ -39,10 +39,12 @@ from backend.spatial.boxes import Boxes
 from backend.spatial.identity import ByIdentity
 from backend.spatial.types import Array, BoolArray
 
-VIEW, LEAST = 15.0, 3.0
+VIEW, LEAST = 15.0, 2.0
 """How far from the base zones are complete [m], and how far at least, however much is there."""
 MOST = {PEOPLE: 30, SITE: 100}
-"""Boxes of a layer that are looked at; beyond these the view is shorter."""
+"""Boxes of a layer that are looked at; where there are more, the view is shorter."""
+ON_SLOPES = 2
+"""So many times fewer of a machine on a slope, where a zone takes some times as long."""
 VARIANTS = {PEOPLE: (AS_IS, ANY_SWING, ANY_POSTURE, TURNING), SITE: (AS_IS, ANY_SWING, ANY_POSTURE)}
 """Turning takes as long as any swing; of the site it is left out."""
 
@@ -81,7 +83,7 @@ def people_zone(snapshot: Snapshot, config: Config, own: str) -> ZoneImage:
         return ZoneImage(own, None, time, base, math.nan, {}, {}, PEOPLE, 0.0, people.reason)
     T, eta = set_upright(machine, T, state.pose.yaw, state.eta)
     boxes = everybody(people)[0]
-    near, view = in_view(machine, T[:3, 3], boxes, eta, MOST[PEOPLE])
+    near, view = in_view(machine, T[:3, 3], boxes, eta, most_of(PEOPLE, T))
     seen = boxes.take(near)
     zones = {
         name: one_zone(name, machine, state.pose.joints, T, seen, eta, TOLERANCE)
@@ -118,6 +120,12 @@ def site_zone(snapshot: Snapshot, config: Config, own: str) -> ZoneImage:
     zones = {name: zone for name, (zone, _, _) in found.items()}
     _, eta, view = found[AS_IS]
     return _image(snapshot, own, SITE, eta, zones, view)
+
+
+def most_of(layer: str, T: Array) -> int:
+    """Boxes of a layer to look at when the base stands at T (4, 4)."""
+    upright = np.hypot(T[0, 2], T[1, 2]) == 0.0
+    return MOST[layer] if upright else MOST[layer] // ON_SLOPES
 
 
 def in_view(
@@ -158,7 +166,7 @@ def _of_site(
     T = transform.make(rotation.from_attitude(yaw, pitch, roll), place)
     T, eta = set_upright(model, T, yaw, LENGTH * length + rounding(model, variant))
     boxes = site.value.boxes
-    near, view = in_view(model, place, boxes, eta, MOST[SITE], CELL * math.sqrt(0.5))
+    near, view = in_view(model, place, boxes, eta, most_of(SITE, T), CELL * math.sqrt(0.5))
     q = ANGLE * np.array(joints, dtype=float)
     zone = one_zone(variant, model, q, T, boxes.take(near), eta, TOLERANCE)
     return zone, eta, view
