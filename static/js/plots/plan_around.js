@@ -15,10 +15,15 @@ export const view = { shown: true };
 const AROUND = [{ name: "site", fill: 0.16, hatch: 0.4 }, { name: "people", fill: 0.1, hatch: 0.5 }].map((one) => ({ ...LAYERS.find(({ name }) => name === one.name), ...one, kind: LAYERS.find(({ name }) => name === one.name).hatch }));
 const LINES = [{ name: "any_swing", dash: [7, 4], width: 1.2 }, { name: "as_is", dash: [], width: 1.8 }];
 
+const OLD_ZONE = "its zone is old";
+
+/** "people unknown"; "site zone old". */
+const missed = ({ name, reason }) => `${name} ${reason === OLD_ZONE ? "zone old" : "unknown"}`;
+
 /** Why a layer is not known now, else empty. */
 function why(name, entry) {
   if (name === "people" && unknown()) return unknown();
-  return entry.header.reason || (imageStale(entry) ? "its zone is old" : "");
+  return entry.header.reason || (imageStale(entry) ? OLD_ZONE : "");
 }
 
 /** The layers that are computed for the own machine, the last drawn last: [{name, entry, reason, ..}]. */
@@ -66,7 +71,7 @@ function known(exact, stale, layers) {
 /** What is not known, in words: "people unknown". Of a partner far away no zone is made, and none is missing. */
 function missing(exact, stale, layers) {
   const partner = state.partner && (exact ? stale || !exact.header.variants?.as_is : far() === null);
-  return [...(partner ? [`${nameOf(state.partner)} unknown`] : []), ...layers.filter(({ reason }) => reason).map(({ name }) => `${name} unknown`)];
+  return [...(partner ? [`${nameOf(state.partner)} unknown`] : []), ...layers.filter(({ reason }) => reason).map(missed)];
 }
 
 /** How far the base is from the nearest edge of all zones as is, and whose that is. */
@@ -102,7 +107,7 @@ export function freeExit(g, exact, stale, layers, own, inside) {
 }
 
 export const aroundLegend = (g, dpr, layers, drawn) => [...layers].reverse().filter(({ name, reason }) => reason || !drawn[name].variants.as_is?.empty || !drawn[name].variants.any_swing?.empty).map(({ name, colour, kind, reason }) =>
-  reason ? [swatches.line(C.stale, [2, 3], 1.8), `${name} unknown`] : [swatches.area(hatch(g, colour, dpr, 0.85, kind), colour), name]);
+  reason ? [swatches.line(C.stale, [2, 3], 1.8), missed({ name, reason })] : [swatches.area(hatch(g, colour, dpr, 0.85, kind), colour), name]);
 
 const WORDS = [["as_is", "as is"], ["any_swing", "any swing"], ["any_posture", "any posture"]];
 
