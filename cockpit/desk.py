@@ -22,9 +22,9 @@ from backend.safety.partner import Limits
 from backend.safety.people import Watch
 from backend.safety.swing_risk import Boundaries
 from backend.shell.hub import Hub
-from backend.shell.image_loops import ImageLoop
+from backend.shell.image_loops import ImageLoop, ImageMaker
 from backend.shell.image_worker import ImageWorker
-from backend.shell.kinds import ALONG, EXACT, REGIONS, SUN, ZONE, Made, Recipe, Wishes
+from backend.shell.kinds import ALONG, AROUND, EXACT, REGIONS, SUN, ZONE, Made, Recipe, Wishes
 from backend.shell.recent import Recent
 from backend.site.bodies import site_bodies
 from backend.site.site import Site
@@ -114,6 +114,9 @@ def image_loops(site: Site, config: Config, closing: contextlib.ExitStack) -> tu
         worker = ImageWorker(Recipe(config, sun, kinds))
         closing.callback(worker.close)
         loops.append(ImageLoop(name, getattr(site.rates, rate), worker))
+    worker = ImageWorker(Recipe(config, sun, (AROUND,)))
+    closing.callback(worker.close)
+    loops.append(ImageLoop(AROUND, site.rates.zone_hz, OnceThereIs(worker, config)))
     return tuple(loops)
 
 
@@ -131,6 +134,20 @@ def along_loops(site: Site, config: Config, closing: contextlib.ExitStack) -> tu
     worker = ImageWorker(Recipe(config, sun, (ALONG,), ways=ways))
     closing.callback(worker.close)
     return (ImageLoop(ALONG, ALONG_HZ, WhenAsked(worker)),)
+
+
+class OnceThereIs:
+    """Starts a worker's process only once there is something around the machines: people, or
+    anything on the site; from then on it is told, too, when that is gone.
+    """
+
+    def __init__(self, worker: ImageMaker, config: Config) -> None:
+        self._worker = worker
+        self._found = len(config.site.names) > 0
+
+    def make(self, snapshot: Snapshot, wishes: Wishes) -> list[Made]:
+        self._found |= snapshot.people is not None or bool(snapshot.gauge.choice.drawn)
+        return self._worker.make(snapshot, wishes) if self._found else []
 
 
 class WhenAsked:

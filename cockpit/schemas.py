@@ -27,6 +27,7 @@ from backend.documents.recordings import RecordingsDocument, RecoverDocument
 from backend.documents.session import DiffDocument, SeriesDocument, SessionDocument
 from backend.documents.stages import StagesDocument
 from backend.documents.state import StateDocument
+from backend.documents.zone import ZoneFrameHeader
 from backend.errors import InputError
 from backend.shell.app.models import HealthModel, SiteModel, SnapshotModel
 from backend.shell.app.recording import RecordingModel
@@ -50,6 +51,7 @@ SCHEMAS: dict[str, tuple[type[BaseModel], str]] = {
     "recording": (RecordingModel, "/api/recording"),
     "snapshot": (SnapshotModel, "/api/snapshot and the Zenoh key cockpit/snapshot"),
     "people": (PeopleModel, "the key people of a snapshot"),
+    "zone": (ZoneFrameHeader, "the header of a driving zone's frame on the websocket"),
     "site": (SiteModel, "/api/site"),
     "health": (HealthModel, "/api/health"),
     "session": (SessionDocument, "/api/session"),

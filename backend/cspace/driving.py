@@ -1,4 +1,4 @@
-"""Where a machine's base must not stand, exact: its driving zone against a partner's bodies.
+"""Where a machine's base must not stand, exact: its driving zone against bodies that stand.
 
 Three variants: the machine as it is now, moved without turning; swinging freely in its posture;
 in any posture. And the zone while the heading turns. Polygons contain the true zone and exceed it
@@ -9,6 +9,7 @@ distances are measured to them, so they err to the safe side.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import shapely
@@ -32,6 +33,8 @@ TOLERANCE = 8e-4
 
 SLOPE_TOLERANCE = 1e-2
 """The same for what swings about an axis that is not upright [m]: cavities are larger than this."""
+
+AS_IS, ANY_SWING, ANY_POSTURE, TURNING = "as_is", "any_swing", "any_posture", "turning"
 
 _LEVEL = 1e-9
 """A swing axis this close to upright counts as upright [rad]."""
@@ -88,28 +91,42 @@ def driving_zone(
     Raises ValueError for a negative or infinite eta and a tolerance that is not positive.
     """
     _check(eta, tolerance)
-    T, bodies = _local(T_own_base, partner_boxes, eta)
-    to_swing = float(np.linalg.norm(own_machine.arm.T_root_swing[:3, 3]))
-    bodies = _in_view(bodies, own_machine.bounding_radius + to_swing + view)
-    own = kinematics.body_boxes(own_machine, kinematics.link_poses(own_machine, own_q, T))
-    tracks = np.array([own_machine.part_of_body(b) == "tracks" for b in range(len(own))])
-    parked = slice_pieces(bodies, own.take(tracks))
-    upright = np.hypot(*T[:2, 2]) <= _LEVEL
-    # Half of the tolerance for the radii of the solid, half for drawing its arcs.
-    part = 0.5 * (tolerance if upright else max(tolerance, SLOPE_TOLERANCE))
-    now = cover(slice_pieces(bodies, own))
-    swing = cover(
-        joined_pieces([parked, _swinging(own_machine, own, own_q, tracks, T, bodies, part)])
-    )
-    arm = swept_arm(own_machine, part)
-    posture = cover(
-        joined_pieces([parked, _about(arm, T @ own_machine.arm.T_root_swing, bodies, part)])
-    )
+    near = partner_boxes
+    if np.isfinite(view):
+        near = _in_view(partner_boxes, T_own_base, whole_reach(own_machine) + view + 2.0 * eta)
+    scene = _Scene.of(own_machine, own_q, T_own_base, near, eta, tolerance)
     base = np.asarray(T_own_base, dtype=float)[:2, 3]
-    zones = {"as_is": now, "any_swing": swing, "any_posture": posture}
+    zones = {name: scene.zone(name) for name in (AS_IS, ANY_SWING, ANY_POSTURE)}
     exits = {name: way_out(zone, np.zeros(2)) for name, zone in zones.items()}
     placed = {name: shapely.transform(zone, lambda p: p + base) for name, zone in zones.items()}
     return DrivingZone(exits=exits, **placed)
+
+
+def one_zone(
+    variant: str,
+    own_machine: Machine,
+    own_q: Array,
+    T_own_base: Array,
+    boxes: Boxes,
+    eta: float = 0.0,
+    tolerance: float = TOLERANCE,
+) -> BaseGeometry:
+    """A single variant of the zone: AS_IS, ANY_SWING, ANY_POSTURE or TURNING (a full circle).
+
+    boxes: of whatever must not be touched. Other arguments as in `driving_zone`; ANY_SWING asks for
+    no swing angle, ANY_POSTURE for no joint values at all.
+    """
+    if variant == TURNING:
+        return turning_zone(own_machine, own_q, T_own_base, boxes, eta=eta, tolerance=tolerance)
+    _check(eta, tolerance)
+    base = np.asarray(T_own_base, dtype=float)[:2, 3]
+    zone = _Scene.of(own_machine, own_q, T_own_base, boxes, eta, tolerance).zone(variant)
+    return shapely.transform(zone, lambda p: p + base)
+
+
+def whole_reach(machine: Machine) -> float:
+    """No point of a machine is farther from the origin of its root frame in any posture [m]."""
+    return machine.bounding_radius + float(np.linalg.norm(machine.arm.T_root_swing[:3, 3]))
 
 
 def turning_zone(
@@ -153,6 +170,51 @@ def way_out(zone: BaseGeometry, point: Array) -> Exit:
     return Exit(-length if inside else length, direction, length if inside else 0.0)
 
 
+@dataclass(frozen=True)
+class _Scene:
+    """Own bodies and those that it must not touch, about the own base. part: of the tolerance."""
+
+    machine: Machine
+    q: Array
+    T: Array
+    own: Boxes
+    bodies: Boxes
+    part: float
+
+    @staticmethod
+    def of(
+        machine: Machine, q: Array, T_base: Array, boxes: Boxes, eta: float, tolerance: float
+    ) -> _Scene:
+        T, bodies = _local(T_base, boxes, eta)
+        own = kinematics.body_boxes(machine, kinematics.link_poses(machine, q, T))
+        upright = np.hypot(*T[:2, 2]) <= _LEVEL
+        # Half of the tolerance for the radii of the solid, half for drawing its arcs.
+        part = 0.5 * (tolerance if upright else max(tolerance, SLOPE_TOLERANCE))
+        return _Scene(machine, q, T, own, bodies, part)
+
+    @cached_property
+    def tracks(self) -> BoolArray:
+        """(n,) which of the own bodies do not swing."""
+        parts = (self.machine.part_of_body(b) for b in range(len(self.own)))
+        return np.array([part == "tracks" for part in parts])
+
+    @cached_property
+    def parked(self) -> Pieces:
+        return slice_pieces(self.bodies, self.own.take(self.tracks))
+
+    def zone(self, variant: str) -> BaseGeometry:
+        """Shifts of the base; not for TURNING."""
+        if variant == AS_IS:
+            return cover(slice_pieces(self.bodies, self.own))
+        if variant == ANY_SWING:
+            args = (self.machine, self.own, self.q, self.tracks, self.T, self.bodies, self.part)
+            return cover(joined_pieces([self.parked, _swinging(*args)]))
+        if variant != ANY_POSTURE:
+            raise ValueError(f"no variant of a zone is called {variant}")
+        arm, axis = swept_arm(self.machine, self.part), self.T @ self.machine.arm.T_root_swing
+        return cover(joined_pieces([self.parked, _about(arm, axis, self.bodies, self.part)]))
+
+
 def _swinging(
     machine: Machine, own: Boxes, q: Array, tracks: BoolArray, T: Array, bodies: Boxes, part: float
 ) -> Pieces:
@@ -192,9 +254,9 @@ def _local(T_own_base: Array, partner_boxes: Boxes, eta: float) -> tuple[Array, 
     return T, bodies.inflated(eta) if eta > 0.0 else bodies
 
 
-def _in_view(bodies: Boxes, radius: float) -> Boxes:
-    """The boxes whose bounding spheres come within `radius` [m] of the vertical at the origin."""
-    apart = np.hypot(bodies.centers[:, 0], bodies.centers[:, 1])
+def _in_view(bodies: Boxes, T_base: Array, radius: float) -> Boxes:
+    """The boxes whose bounding spheres come within `radius` [m] of the vertical at the base."""
+    apart = np.hypot(*(bodies.centers[:, :2] - np.asarray(T_base, dtype=float)[:2, 3]).T)
     return bodies.take(apart - np.linalg.norm(bodies.half_extents, axis=1) <= radius)
 
 

@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from backend.site.travel import Way
 
 SUN, EXACT, ZONE, REGIONS, ALONG = "sun", "exact", "zone", "regions", "along"
+AROUND = "around"
+"""Zones of people and the site, which are images of the kind ZONE."""
 
 
 class Image(Protocol):
@@ -76,7 +78,7 @@ def make_images(recipe: Recipe, snapshot: Snapshot, wishes: Wishes) -> list[Made
         for make in _makers(kind, recipe, snapshot, wishes):
             start = time.perf_counter()
             image = make()
-            made.append(Made(kind, image, time.perf_counter() - start))
+            made.append(Made(ZONE if kind == AROUND else kind, image, time.perf_counter() - start))
     return made
 
 
@@ -86,6 +88,11 @@ def _makers(
     config = recipe.config
     if kind == ALONG:
         return _along(recipe, snapshot, wishes)
+    if kind == AROUND:
+        from backend.pipeline.zones_around import zones_around
+
+        around = zones_around(snapshot, config)
+        return [partial(make, snapshot, config, own) for make, own in around]
     if kind in (SUN, ZONE):
         pairs = ordered_pairs(snapshot, config)
         if kind == ZONE:

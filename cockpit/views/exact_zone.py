@@ -1,4 +1,5 @@
-"""The exact warning zone of one partner on the ground: where the own base would mean contact.
+"""The exact warning zone of one partner, people or the site on the ground: where the own base would
+mean contact.
 
 Filled with a solid outline: as the machine is now. Dashed: swinging freely. Dotted: in any posture.
 """
@@ -41,13 +42,20 @@ def outline(geometry: BaseGeometry | None, dash: tuple[float, float] | None) -> 
 class ExactZoneNodes:
     """The variants of one zone; grey without a fill when old."""
 
-    def __init__(self, scene: viser.SceneApi, name: str) -> None:
+    def __init__(
+        self,
+        scene: viser.SceneApi,
+        name: str,
+        color: palette.Rgb = palette.PARTNER,
+        variants: tuple[str, ...] = tuple(LINES),
+    ) -> None:
+        self._color = color
         self._root = scene.add_frame(name, show_axes=False, visible=False)
         self._fill = scene.add_mesh_simple(
             f"{name}/fill",
             np.array([[0, 0, 0], [1e-3, 0, 0], [0, 1e-3, 0]], dtype=np.float32),
             np.array([[0, 1, 2]], dtype=np.uint32),
-            color=palette.PARTNER,
+            color=color,
             opacity=0.30,
             side="double",
             cast_shadow=False,
@@ -58,13 +66,14 @@ class ExactZoneNodes:
             variant: scene.add_line_segments(
                 f"{name}/{variant}",
                 NO_LINE,
-                palette.each(palette.PARTNER, NO_LINE),
+                palette.each(color, NO_LINE),
                 thickness=width,
                 thickness_units="screen",
                 position=(0.0, 0.0, 0.006),
                 visible=False,
             )
             for variant, (_, width) in LINES.items()
+            if variant in variants
         }
         self._image: ExactZoneImage | None = None
         self._old = False
@@ -85,23 +94,22 @@ class ExactZoneNodes:
 
     def _draw(self, image: ExactZoneImage) -> None:
         drawn = {}
-        for variant in LINES:
+        for variant in self._lines:
             geometry = image.zones.get(variant)
             drawn[variant] = None if geometry is None else geometry.simplify(DRAWN)
         zone = drawn[AS_IS]
         self._area = zone is not None and zone.area > 0.0
         if zone is not None and self._area:
             self._fill.vertices, self._fill.faces = filled_geometry(zone)
-        for variant, (dash, _) in LINES.items():
-            points = outline(drawn[variant], dash)
-            node = self._lines[variant]
+        for variant, node in self._lines.items():
+            points = outline(drawn[variant], LINES[variant][0])
             node.visible = len(points) > 0
             if len(points):
                 node.points = points
 
     def _paint(self) -> None:
         self._fill.visible = self._area and not self._old
-        color = palette.STALE if self._old else palette.PARTNER
+        color = palette.STALE if self._old else self._color
         for node in self._lines.values():
             colors = palette.each(color, node.points)
             if not np.array_equal(node.colors, colors):

@@ -130,6 +130,7 @@ class SnapshotSource(Protocol):
     def image(self, kind: str, key: str) -> Any | None:
         """The newest image of a kind, None before there is one.
 
-        "sun": a ZoneImage and "zone": an ExactZoneImage, both per "own<-partner"; "exact": a
+        "sun": a ZoneImage and "zone": an ExactZoneImage, both per "own<-partner", the latter per
+        "own<-layer:people" and "own<-layer:site" too; "exact": a
         backend.pipeline.exact.OwnImage, per own machine.
         """

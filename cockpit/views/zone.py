@@ -17,6 +17,7 @@ from cockpit.views.shapes import NO_LINE, filled, polyline
 OLD = 1.0  # [s] after which an image is no longer coloured
 EXACT, SUN = "exact", "sun"
 ZONE_KINDS = (EXACT, SUN)
+AROUND = {"site": palette.SITE, "people": palette.PEOPLE}
 CROSS = np.array([[[-1, 0, 0], [1, 0, 0]], [[0, -1, 0], [0, 1, 0]]], dtype=np.float32)
 
 
@@ -50,7 +51,8 @@ class OwnNodes:
         lost: float,
         kind: str = EXACT,
     ) -> None:
-        """The zones of all partners of `own`; ground: its height [m]; lost: as in Scene [s].
+        """The zones of all partners of `own`, of people and the site; ground: its height [m];
+        lost: as in Scene [s].
 
         kind: "exact" draws the exact zone of each partner, and Sun's while there is none.
         """
@@ -80,6 +82,21 @@ class OwnNodes:
                 self._zones[partner].update(sun, now, ground)
             if partner in self._exact:
                 self._exact[partner].update(exact, now, ground)
+        self._around(images, now, ground, kind)
+
+    def _around(self, images: SnapshotSource, now: float, ground: float, kind: str) -> None:
+        """Nothing of people while nobody knows where they are: the page says so."""
+        for layer, color in AROUND.items():
+            zone = images.image("zone", f"{self.own}<-layer:{layer}") if kind == EXACT else None
+            if not known(zone):
+                zone = None
+            node = f"layer:{layer}"
+            if zone is not None and node not in self._exact:
+                self._exact[node] = ExactZoneNodes(
+                    self._scene, f"/own/around/{layer}", color, ("as_is", "any_swing")
+                )
+            if node in self._exact:
+                self._exact[node].update(zone, now, ground)
 
 
 class ZoneNodes:

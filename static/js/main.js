@@ -95,6 +95,7 @@ function onKey(event) {
   else if (event.key === "m" || event.key === "M") toggleSound();
   else if (event.key === "x" || event.key === "X") switchImages();
   else if (event.key === "t" || event.key === "T") plots.plan.turning();
+  else if (event.key === "z" || event.key === "Z") plots.plan.around();
   else if (event.key === "v" || event.key === "V") toggleLayout();
   else if (event.key === "f" || event.key === "F") toggleFullScreen();
   else if (event.key === "c" || event.key === "C") toggleCameras();
@@ -176,7 +177,7 @@ function onFrame(header, arrays) {
     if (partner !== state.partner || (replaying() && before?.time !== header.time)) for (const s of images) s.dirty = true;
   } else if (header.type === "along") {
     plots.trends.dirty = true;
-  } else if (header.type === "exact" ? header.own === state.own : header.key === `${state.own}<-${state.partner}`) {
+  } else if (header.type === "exact" || header.partner === null ? header.own === state.own : header.key === `${state.own}<-${state.partner}`) {
     for (const s of replaying() ? [...images, plots.bars, plots.plan] : images) s.dirty = true;
   }
 }

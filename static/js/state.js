@@ -14,7 +14,7 @@ export const state = {
   arrival: -Infinity, // of the newest snapshot, performance.now() [ms]
   images: new Map(), // Sun's: "left<-right" -> {header, arrays, arrival, serial}
   exact: new Map(), // "left" -> the same
-  zones: new Map(), // "left<-right" -> the same
+  zones: new Map(), // "left<-right", "left<-layer:people", "left<-layer:site" -> the same
   along: new Map(), // "left" -> the same: the strip along its track
   own: null,
   partner: null,
@@ -130,6 +130,9 @@ export const image = () => (far() === null ? state.images.get(`${state.own}<-${s
 /** The exact image of the own machine, against all partners, the site and itself. */
 export const exactImage = () => state.exact.get(state.own) ?? null;
 export const zoneImage = () => (far() === null ? state.zones.get(`${state.own}<-${state.partner}`) ?? null : null);
+
+/** The own machine's driving zone of "people" or "site"; null where there is none. */
+export const layerZone = (layer) => state.zones.get(`${state.own}<-layer:${layer}`) ?? null;
 
 /** The machines whose data an image was computed from. */
 const parties = ({ header }) => [header.own, ...(header.partners ?? [header.partner])].filter((name) => machine(name));

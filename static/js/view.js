@@ -1,6 +1,6 @@
 // Which images the page shows: the exact ones, Sun's, or both over each other to compare.
 
-import { exactImage, zoneImage } from "./state.js";
+import { exactImage, layerZone, zoneImage } from "./state.js";
 
 const MODES = ["exact", "sun", "difference"];
 export const WORDS = { exact: "Exact", sun: "Sun", difference: "Diff." };
@@ -11,8 +11,9 @@ let chosen = MODES.includes(asked) ? asked : "exact";
 
 /** Without an exact image there is only Sun's. */
 export const shown = () => (exactImage() ? chosen : "sun");
-export const shownZone = () => (zoneImage() ? chosen : "sun");
-export const switchable = () => Boolean(exactImage() || zoneImage());
+const anyZone = () => Boolean(zoneImage() || layerZone("people") || layerZone("site"));
+export const shownZone = () => (anyZone() ? chosen : "sun");
+export const switchable = () => Boolean(exactImage() || anyZone());
 
 export function next() {
   if (!switchable()) return;

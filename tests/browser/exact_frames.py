@@ -171,6 +171,41 @@ def zone(state_time: float, *, base: tuple[float, float] = (0.0, 0.0), **variant
     return encode({"type": "zone", **names, "state_time": state_time, "variants": given}, arrays)
 
 
+def layer_zone(
+    layer: str,
+    state_time: float,
+    centre: tuple[float, float],
+    radius: float,
+    *,
+    base: tuple[float, float] = (0.0, 0.0),
+    reason: str = "",
+) -> bytes:
+    """Zones of people or the site: discs about centre, no turning; none with a reason."""
+    arrays: dict[str, np.ndarray] = {}
+    given: dict[str, Any] = {}
+    far = math.hypot(base[0] - centre[0], base[1] - centre[1])
+    for k, name in enumerate(() if reason else ("as_is", "any_swing", "any_posture")):
+        signed = far - radius - k
+        way = [(b - c) / max(far, 1e-9) for b, c in zip(base, centre, strict=True)]
+        exit_ = {"direction": way, "length": -signed} if signed < 0 else None
+        given[name] = {"signed_distance": min(signed, 15.0), "empty": False, "exit": exit_}
+        arrays[name] = ring(centre, radius + k).astype(np.float32)
+        arrays[f"{name}_rings"] = np.array([[40, 1]], np.int32)
+    header = {
+        "type": "zone",
+        "key": f"left<-layer:{layer}",
+        "own": "left",
+        "partner": None,
+        "layer": layer,
+        "state_time": state_time,
+        "base": list(base),
+        "variants": given,
+        "view": 0.0 if reason else 15.0,
+        "reason": reason,
+    }
+    return encode(header, arrays)
+
+
 def way(
     free: float | None, hits: str | None, can_stop: bool = True, time_now: float | None = None
 ) -> dict[str, Any]:

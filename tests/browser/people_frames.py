@@ -97,10 +97,16 @@ class PeopleFeed(ExactFeed):
                 self.socket.send(sun(self.cycle))
                 self.socket.send(exact(at))
                 self.socket.send(zone(at))
+                for frame in self.more(at):
+                    self.socket.send(frame)
             self.page.wait_for_timeout(40)
             if self.cycle % 5 == 0 and until():
                 return
         pytest.fail(f"the page did not get there: {self.shown('plan')}, {self.shown('trends')}")
+
+    def more(self, at: float) -> list[bytes]:
+        """Other frames of the state time `at`."""
+        return []
 
     def run(self, cycles: int) -> None:
         """So many frames more."""

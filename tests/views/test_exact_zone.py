@@ -68,6 +68,27 @@ def test_dashes_follow_the_outline(on: float, off: float) -> None:
     assert len(dashed(np.zeros((3, 2)), on, off)) == 0
 
 
+def test_zones_of_people_and_the_site_have_their_colours(server: viser.ViserServer) -> None:
+    source, own = toy.Source(), OwnNodes(server.scene, "left", 1.0)
+    snapshot = toy.snapshot(time=10.0)
+    for layer in ("people", "site"):
+        source.images[("zone", f"left<-layer:{layer}")] = zones(9.0)
+    own.update(snapshot, source, 0.3, 0.0)
+    for layer, color in (("people", palette.PEOPLE), ("site", palette.SITE)):
+        fill = handle(server, f"/own/around/{layer}/fill")
+        assert fill.visible
+        assert tuple(fill.color) == tuple(color)
+        lines = handle(server, f"/own/around/{layer}/any_swing")
+        assert len(lines.points) > 0
+        assert (lines.colors == palette.each(color, lines.points)).all()
+    source.images[("zone", "left<-layer:people")] = toy.ExactZone(9.5)  # nobody knows
+    own.update(snapshot, source, 0.3, 0.0)
+    assert not handle(server, "/own/around/people").visible
+    assert handle(server, "/own/around/site").visible
+    own.update(snapshot, source, 0.3, 0.0, "sun")
+    assert not handle(server, "/own/around/site").visible
+
+
 def test_all_variants_are_drawn(server: viser.ViserServer) -> None:
     source, own = toy.Source(), OwnNodes(server.scene, "left", 1.0)
     source.images[("zone", KEY)] = zones(9.0)

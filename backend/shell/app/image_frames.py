@@ -112,7 +112,10 @@ def reach_cells(reach: ReachImage) -> AnyArray:
 
 def zone_frame(image: ZoneImage) -> bytes:
     """Per variant an array of vertices (k, 2), and `.._rings` (r, 2): vertices of each ring, and
-    1 for an exterior, 0 for a hole of the exterior before it.
+    1 for an exterior, 0 for a hole of the exterior before it. `layer` says what must not be
+    touched: "partner", "people" or "site", of which `partner` is null; there are no variants while
+    `reason` says why nothing is known; nothing beyond `view` [m] (null: all) of the base is looked
+    at, and a signed distance of `view` means that far or farther.
     """
     arrays: dict[str, AnyArray] = {}
     variants: dict[str, Any] = {}
@@ -120,7 +123,7 @@ def zone_frame(image: ZoneImage) -> bytes:
         arrays[name], arrays[f"{name}_rings"] = rings(zone)
         way = image.exits[name]
         variants[name] = {
-            "signed_distance": way.signed_distance if math.isfinite(way.signed_distance) else None,
+            "signed_distance": _known(way.signed_distance),
             "empty": zone.is_empty,
             "exit": None
             if way.length <= 0.0
@@ -132,9 +135,12 @@ def zone_frame(image: ZoneImage) -> bytes:
         "own": image.own,
         "partner": image.partner,
         "state_time": image.state_time,
-        "eta": image.eta,
+        "eta": _known(image.eta),
         "base": image.base.tolist(),
         "variants": variants,
+        "layer": image.layer,
+        "view": _known(image.view),
+        "reason": image.reason,
     }
     return encode(header, arrays)
 
@@ -173,6 +179,10 @@ def along_frame(image: AlongImage) -> bytes:
 
 def _finite(value: float) -> float:
     return value if math.isfinite(value) else math.nan
+
+
+def _known(value: float) -> float | None:
+    return value if math.isfinite(value) else None
 
 
 def rings(zone: BaseGeometry) -> tuple[AnyArray, AnyArray]:

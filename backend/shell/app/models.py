@@ -276,6 +276,9 @@ class BackendModel(BaseModel):
     step: TimingModel = Field(description="the fast loop: fusion, distances, concerns")
     images: TimingModel = Field(description="the image loop: Sun's sets and the exact images")
     zones: TimingModel = Field(description="the loop of driving zones and free regions")
+    around: TimingModel | None = Field(
+        default=None, description="the loop of driving zones of people and the site"
+    )
     along: TimingModel | None = Field(
         default=None, description="the loop of strips along tracks, on a site with tracks"
     )

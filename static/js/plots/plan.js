@@ -18,6 +18,7 @@ import { insideWords } from "../people/model.js";
 import { areaKey, drawAreas, hasAreas, tellAreas } from "./plan_areas.js";
 import { drawPeople, peopleLines, personSwatch } from "./plan_people.js";
 import { distanceText, drawZones, outlineSun, view as zoneView, zoneExit, zoneLegend, zoneLines, zoneNote } from "./plan_zone.js";
+import { around, aroundLegend, aroundLines, drawAround, freeExit, nearestNote, nearestText, view as aroundView } from "./plan_around.js";
 
 const WIDTHS = [20, 30, 50, 100];
 
@@ -79,9 +80,12 @@ function paint(g, width, height, dpr) {
   const zone = zonePoints(image());
   const entry = exact ?? image();
   const stale = imageStale(entry);
+  const layers = how === "sun" ? [] : around();
+  const below = drawAround(g, layers.filter(({ name }) => name === "site"), dpr);
   const zones = exact ? drawZones(g, exact, dpr, stale) : null;
   if (!exact) drawZone(g, zone, dpr, stale ? C.stale : C.partner);
   else if (how === "difference") outlineSun(g, zone);
+  const drawn = { ...below, ...drawAround(g, layers.filter(({ name }) => name !== "site"), dpr) };
   if (replaying()) playbackMark(g, box);
   drawAreas(g);
   gauge(g);
@@ -89,33 +93,36 @@ function paint(g, width, height, dpr) {
   for (const name of names()) if (name !== state.own) outlines(g, name);
   outlines(g, state.own);
   if (view.iso) iso(g, own);
-  const exit = exact ? zoneExit(g, exact, own) : exitArrow(g, own, zone);
+  const exit = layers.length && exact ? freeExit(g, exact, stale, layers, own, inside) : exact ? zoneExit(g, exact, own) : exitArrow(g, own, zone) ?? freeExit(g, null, true, layers, own, inside);
   const nearest = nearestLine(g);
   for (const name of names()) base(g, name);
   const areas = tellAreas(g);
   const seen = drawPeople(g);
   north(g, turn);
-  if (exact) zoneNote(g, exact, stale);
+  const note = layers.length ? nearestNote(g, exact, stale, layers) : null;
+  if (exact && !layers.length) zoneNote(g, exact, stale);
   paintDrawing(g);
   g.restore();
   if (!view.tracksUp) gridText(g, grid, height, t);
   if (rows > 1) legend(g, 6, height - 1.95 * t, width - 8, areaKey);
   const age = Math.max(snapshotAge(), entry ? imageAge(entry) : 0);
   const staleZone = `zone ${staleText(imageAge(entry))}`;
+  const whose = aroundLegend(g, dpr, layers, drawn);
+  const [first, ...others] = exact && !stale ? zoneLegend(g, dpr, stale, zones) : [];
   legend(g, 6, height - 0.65 * t, width - 8, [
     ...(exact && how === "difference" ? [[swatches.line("#FFFFFF"), "Sun"]] : []),
-    ...(exact ? stale ? [[zoneLegend(g, dpr, stale, { as_is: 1 })[0][0], staleZone]] : zoneLegend(g, dpr, stale, zones)
-      : [[swatches.area(hatch(g, stale ? C.stale : C.partner, dpr), stale ? C.stale : C.partner), stale ? staleZone : "zone for ✚ (Sun)"]]),
+    ...(exact ? stale ? [[zoneLegend(g, dpr, stale, { as_is: 1 })[0][0], staleZone], ...whose] : [...(first ? [first] : []), ...whose, ...others]
+      : [[swatches.area(hatch(g, stale ? C.stale : C.partner, dpr), stale ? C.stale : C.partner), stale ? staleZone : "zone for ✚ (Sun)"], ...whose]),
     ...(rows > 1 ? [] : [[swatches.line(C.text), "reach now"], [swatches.line(C.text, [4, 3], 1.5), "max"]]),
     ...(seen?.tracks.length ? [[swatches.glyph(personSwatch), "person"]] : []),
   ]);
   return {
     state: {
       own: state.own, partner: state.partner, playback: replaying(), width: view.width, centre: view.centre, up: view.tracksUp ? "tracks" : "north",
-      base: own.position?.slice(0, 2), zone: zone.length, zones, shown: how, zone_stale: stale, exit, nearest, people: seen, areas, gauge: inForce(), machines: names().filter((name) => machine(name)?.outlines).length,
+      base: own.position?.slice(0, 2), zone: zone.length, zones, around: drawn, note, shown: how, zone_stale: stale, exit, nearest, people: seen, areas, gauge: inForce(), machines: names().filter((name) => machine(name)?.outlines).length,
     },
     age,
-    label: `Plan of ${view.width} m: ${nameOf(state.own)} base at ${own.position_projected ? own.position_projected.slice(0, 2).map((v) => v.toFixed(1)).join(", ") : "unknown"}; nearest distance to ${nameOf(state.partner)} ${nearest === null ? "unknown" : metres(nearest)}${exit ? `; base inside the warning zone by ${metres(exit)}` : ""}${exact ? `; ${distanceText(exact)}` : ""}${insideWords().map((words) => `; ${words}`).join("")}`,
+    label: `Plan of ${view.width} m: ${nameOf(state.own)} base at ${own.position_projected ? own.position_projected.slice(0, 2).map((v) => v.toFixed(1)).join(", ") : "unknown"}; nearest distance to ${nameOf(state.partner)} ${nearest === null ? "unknown" : metres(nearest)}${exit ? `; base inside the warning zone by ${metres(exit)}` : ""}${layers.length ? `; ${nearestText(exact, stale, layers)}` : exact ? `; ${distanceText(exact)}` : ""}${insideWords().map((words) => `; ${words}`).join("")}`,
   };
 }
 
@@ -130,6 +137,7 @@ function probe(x, y) {
   const exact = shownZone() === "sun" ? null : zoneImage();
   const zone = exact ? [] : zonePoints(image());
   if (exact) lines.push(...zoneLines(exact, [e, n], inside));
+  if (shownZone() !== "sun") lines.push(...aroundLines(around(), [e, n], inside));
   if (zone.length > 2) lines.push(inside([e, n], zone) ? `inside ${nameOf(state.own)}'s warning zone (${nameOf(state.partner)})` : `free for ${nameOf(state.own)}'s base (Sun)`);
   const from = own.swing_center ?? own.position;
   if (from) lines.push(`${number(Math.hypot(e - from[0], n - from[1]), 2)} m from ${nameOf(state.own)}, azimuth ${degrees(Math.atan2(n - from[1], e - from[0]))}`);
@@ -151,6 +159,10 @@ export function plan() {
   });
   s.turning = () => {
     zoneView.turning = !zoneView.turning;
+    redraw();
+  };
+  s.around = () => {
+    aroundView.shown = !aroundView.shown;
     redraw();
   };
   $("plan-up").addEventListener("click", () => {

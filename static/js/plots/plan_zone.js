@@ -16,7 +16,7 @@ const VARIANTS = [
 ];
 
 /** Rings [[[x, y], ..], ..] of a variant, holes among them. */
-function rings(entry, name) {
+export function rings(entry, name) {
   const points = entry?.arrays[name]?.data, list = entry?.arrays[`${name}_rings`]?.data;
   if (!points || !list) return [];
   const found = [];
@@ -28,7 +28,7 @@ function rings(entry, name) {
   return found;
 }
 
-function path(shape) {
+export function path(shape) {
   const drawn = new Path2D();
   for (const ring of shape) {
     ring.forEach((p, i) => (i ? drawn.lineTo(...chart.at(p)) : drawn.moveTo(...chart.at(p))));
@@ -93,7 +93,7 @@ export function zoneNote(g, entry, stale) {
 }
 
 /** Even-odd over all rings. */
-function insideZone(point, entry, name, inside) {
+export function insideZone(point, entry, name, inside) {
   return rings(entry, name).filter((ring) => inside(point, ring)).length % 2 === 1;
 }
 
