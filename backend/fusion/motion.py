@@ -153,7 +153,7 @@ def _joint_samples(
         rows = recent(entries, stamp, JOINT_WINDOW)
         rates = slope([row.stamp for row in rows], [row.value for row in rows], rig.continuous)
     limit = rig.config.max_extrapolation
-    sigma = rig.config.sigma_joints
+    sigma = max(a.sigma, b.sigma)
     if gap != 0.0:
         ahead = min(max(gap, 0.0), limit)
         q = tuple(value + rate * ahead for value, rate in zip(q, rates, strict=True))
