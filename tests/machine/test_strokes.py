@@ -276,3 +276,11 @@ def test_the_zx200s_own_cylinders_are_strokes(shared_data: Path) -> None:
         )
         back = [angle(stroke, float(value)) for value in read]
         np.testing.assert_allclose(back, q[:, stroke.joint], atol=1e-9, rtol=0.0)
+
+
+def test_the_readmes_example_is_the_minis_bucket(mini: Machine, repository: Path) -> None:
+    text = (repository / "scenes/machines/README.md").read_text().split("## Stroke sensors")[1]
+    (table,) = tomllib.loads(text.split("```toml\n")[1].split("```")[0])["cylinder"]
+    shipped = tomllib.loads((repository / "scenes/machines/mini/mini.toml").read_text())["cylinder"]
+    assert table.pop("closed_length") == pytest.approx(mini.strokes[2].closed_length, abs=1e-3)
+    assert table == shipped[2]
