@@ -107,8 +107,8 @@ def angle(stroke: Stroke, read: float) -> float:
         return math.nan
     if length < lengths[0] or length > lengths[-1]:
         end = 0 if length < lengths[0] else -1
-        _, slope = length_and_slope(stroke, angles[end])
-        return angles[end] + (length - lengths[end]) / float(slope)
+        at_end = float(length_and_slope(stroke, angles[end])[1])
+        return angles[end] + (length - lengths[end]) / at_end
     k = min(bisect_right(lengths, length), len(lengths) - 1)
     share = (length - lengths[k - 1]) / (lengths[k] - lengths[k - 1])
     below, above = angles[k - 1], angles[k]  # of the shorter and the longer length
