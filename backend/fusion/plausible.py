@@ -34,8 +34,9 @@ class Entry(NamedTuple):
 
     value, velocity: joints [rad, rad/s] (value NaN where a joint is not published, velocity empty
     when unknown), position [m], heading [rad], or IMU quaternion (w, x, y, z) and rate [rad/s].
-    sigma: [m] or [rad], of one axis. missing: (joint, why its value is NaN in words) where there
-    is more to say than that it is not published.
+    sigma: [m] or [rad], of one axis. Of joints only: sigmas, of each [rad], 0 where its angle is
+    measured, and empty where all are; missing: (joint, why its value is NaN in words)
+    where there is more to say than that it is not published.
     """
 
     stamp: float
@@ -44,6 +45,7 @@ class Entry(NamedTuple):
     velocity: tuple[float, ...]
     sigma: float
     fix: Fix = Fix.NONE
+    sigmas: tuple[float, ...] = ()
     missing: tuple[tuple[int, str], ...] = ()
 
 
@@ -60,7 +62,8 @@ def joints(rig: Rig, sample: JointSample) -> Entry | None:
     if found is None or sample.position.shape != (n,) or sample.velocity.shape not in ((n,), (0,)):
         return None
     position, velocity = sample.position.tolist(), sample.velocity.tolist()
-    values, rates, missing, sigma = [], [], list(found.missing), rig.config.sigma_joints
+    values, rates, missing = [], [], list(found.missing)
+    sigmas = [0.0] * len(found.columns)
     for k, (column, which) in enumerate(zip(found.columns, found.strokes, strict=True)):
         if column < 0:
             values.append(math.nan)
@@ -76,7 +79,7 @@ def joints(rig: Rig, sample: JointSample) -> Entry | None:
                 rates.append(math.nan)
                 continue
             per_metre = float(strokes.rate(stroke, angle, 1.0))
-            sigma = max(sigma, rig.config.sigma_stroke * abs(per_metre))
+            sigmas[k] = rig.config.sigma_stroke * abs(per_metre)
             value, rate = angle, rate * per_metre
         if not rig.low[k] <= value <= rig.high[k]:  # false for NaN, too
             return None
@@ -85,8 +88,15 @@ def joints(rig: Rig, sample: JointSample) -> Entry | None:
         values.append(value)
         rates.append(rate)
     known = tuple(rates) if velocity else ()
-    stamps = sample.stamp, sample.arrival
-    return Entry(*stamps, tuple(values), known, sigma, missing=tuple(missing))
+    return Entry(
+        sample.stamp,
+        sample.arrival,
+        tuple(values),
+        known,
+        rig.config.sigma_joints,
+        sigmas=tuple(sigmas) if any(sigmas) else (),
+        missing=tuple(missing),
+    )
 
 
 def _outside(stroke: Stroke, read: float) -> str:

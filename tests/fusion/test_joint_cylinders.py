@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from fusion_world import Motion, World, feed, pose_at
 
+from backend.fusion.inflation import joint_slack, spread
 from backend.fusion.plausible import Entry
 from backend.fusion.pose import FusedPose, Validity
 from backend.fusion.rig import Rig
@@ -77,10 +78,11 @@ def test_an_error_of_the_stroke_is_the_larger_in_angle_the_smaller_the_lever(rig
     for q in (-2.1, -0.5, 0.8):
         lever = (read(rig, names[3], q + h) - read(rig, names[3], q - h)) / (2.0 * h)
         entry = first(rig, sample(names, [0.3, 0.5, -1.2, read(rig, names[3], q)]))
-        assert entry.sigma == pytest.approx(max(0.003, 0.0005 / abs(lever)), rel=1e-3)
-        found.append(entry.sigma)
+        assert entry.sigmas[:3] == (0.0, 0.0, 0.0)
+        assert entry.sigmas[3] == pytest.approx(0.0005 / abs(lever), rel=1e-3)
+        found.append(entry.sigmas[3])
     assert max(found) > 0.004
-    assert first(rig, sample(("swing",), [0.3])).sigma == 0.003
+    assert first(rig, sample(("swing",), [0.3])).sigmas == ()
 
 
 def fed(
@@ -115,7 +117,20 @@ def test_a_pose_from_strokes_is_valid_and_less_certain_by_the_lever(rig: Rig) ->
         names = (*s.names[:3], "bucket_cylinder")
         return replace(s, names=names, position=np.array([*s.position[:3], bucket]))
 
-    assert fed(rig, change).sigma_joints > 0.004
+    uncertain, certain = fed(rig, change), fed(rig, lambda s: s)
+    lever = (read(rig, "bucket_cylinder", 0.3 + 1e-5) - bucket) / 1e-5
+    expected = [0.003, 0.003, 0.003, 0.0005 / abs(lever)]
+    assert uncertain.joint_sigmas == pytest.approx(expected, rel=1e-3)
+    assert uncertain.sigma_joints == uncertain.joint_sigmas.max()
+    assert certain.joint_sigmas.tolist() == [certain.sigma_joints] * 4
+    assert uncertain.sigma_yaw == certain.sigma_yaw  # the swing's angle is measured
+    # Only the bucket's own lever, 0.7 m, carries it to the tip.
+    more = spread(rig.machine, uncertain) ** 2 - spread(rig.machine, certain) ** 2
+    own = uncertain.sigma_joints**2 - certain.sigma_joints**2
+    assert more == pytest.approx(9.0 * 0.7**2 * own)
+    slack = joint_slack(uncertain) - joint_slack(certain)
+    assert slack[:3].tolist() == [0.0, 0.0, 0.0]
+    assert slack[3] > 3e-3
 
 
 @pytest.mark.parametrize(("beyond", "valid"), [(0.004, True), (0.006, False)])
