@@ -20,7 +20,7 @@ from backend.spatial.types import Array
 BEYOND = 0.005
 """How far [m] a stroke may read beyond those of the joint's range and still be believed."""
 
-CLOSE = 1e-10  # [rad] of a last step, whose square is what it leaves
+CLOSE = 1e-7  # [rad] of a last step, whose square is what it leaves
 
 
 @dataclass(frozen=True)
@@ -90,8 +90,8 @@ def rate(stroke: Stroke, q: Array | float, velocity: Array | float) -> Array:
     """The joint's rate [rad/s] at joint values q from the rod's velocity [m/s]; q outside the
     range counts as its end.
     """
-    ends = stroke.angles[0], stroke.angles[-1]
-    slope = length_and_slope(stroke, np.clip(q, min(ends), max(ends)))[1]
+    low, high = sorted((stroke.angles[0], stroke.angles[-1]))
+    slope = length_and_slope(stroke, np.minimum(np.maximum(q, low), high))[1]
     return np.asarray(velocity / slope)
 
 
