@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from backend.fusion.pose import Validity
+from backend.fusion.samples import JointSample
 from backend.shell.link.codec import decode
 from backend.shell.session.cycles import Topics
 from backend.shell.session.evaluate import evaluate
@@ -27,6 +28,7 @@ def test_strokes_are_recorded_and_played_back(tmp_path: Path) -> None:
     session = open_session(tmp_path / "s.mcap")
     message = next(m for m in session.messages() if m.topic == "/left/joint_states")
     sample = decode("left", "joint_states", message.data, 0.0)
+    assert isinstance(sample, JointSample)
     assert sample.names[1:] == ("boom_cylinder", "stick_cylinder", "bucket_cylinder")
     assert (sample.position[1:] > 0.0).all()
     again = [s for _, s in evaluate(session, Topics.of(site), config)]
