@@ -54,7 +54,7 @@ class Scene:
 
     def slack(self, own: str) -> Array:
         """(n,) 3 sigma of the joints of `own` [rad]."""
-        return np.full(len(self.machines[own].joints), 3.0 * self.poses[own].sigma_joints)
+        return np.asarray(3.0 * self.poses[own].joint_sigmas)
 
 
 def make_scene(

@@ -70,11 +70,12 @@ def fuse(rig: Rig, streams: Streams, now: float, common: float) -> FusedPose:
         base_velocity=base.velocity,
         sigma_position=base.sigma,
         sigma_yaw=course.sigma,
-        sigma_joints=arm.sigma,
+        sigma_joints=arm.sigma if arm.sigma_each is None else float(arm.sigma_each.max()),
         fix=fix,
         streams=status,
         clock_offset=offset[:2] if offset and offset[2] == "offset" else None,
         yaw_rate=course.rate,
+        sigma_each=arm.sigma_each,
     )
 
 

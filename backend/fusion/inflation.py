@@ -2,7 +2,7 @@
 
     eta = configured + 3 sigma + speed * age
 
-sigma^2 = sigma_position^2 + (reach * sigma_yaw)^2 + sum_k (lever_k * sigma_joints)^2, the bucket
+sigma^2 = sigma_position^2 + (reach * sigma_yaw)^2 + sum_k (lever_k * sigma_k)^2, the bucket
 tip's standard deviation from independent errors, at full stretch (an upper bound in every posture).
 speed * age = |base velocity| * age of the position + sum_k lever_k |rate_k| * age of the joints,
 the way the tip can have gone since its data were measured. Ages are the worst cases of the clock's
@@ -34,7 +34,7 @@ def spread(machine: Machine, pose: FusedPose) -> float:
     variance = (
         pose.sigma_position**2
         + (machine.max_reach * pose.sigma_yaw) ** 2
-        + float(np.sum((levers(machine) * pose.sigma_joints) ** 2))
+        + float(np.sum((levers(machine) * pose.joint_sigmas) ** 2))
     )
     return 3.0 * math.sqrt(variance)
 
@@ -52,4 +52,4 @@ def eta(machine: Machine, pose: FusedPose, configured: float) -> float:
 def joint_slack(pose: FusedPose) -> Array:
     """(n,) how far each joint may be from its value: 3 sigma + |rate| * age [rad]."""
     age = min(pose.streams["joints"].age, OLDEST)
-    return np.asarray(3.0 * pose.sigma_joints + np.abs(pose.joint_velocities) * age)
+    return np.asarray(3.0 * pose.joint_sigmas + np.abs(pose.joint_velocities) * age)

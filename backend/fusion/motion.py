@@ -40,12 +40,15 @@ def tilt(pitch: float, roll: float) -> Array:
 class Arm:
     """q, rates: (n,) [rad, rad/s], 0 where unknown; unknown: those joints' indices.
 
-    pitch, roll of the root [rad] with sigma_tilt (0 for a base taken as level); sigma: of a joint.
+    pitch, roll of the root [rad] with sigma_tilt (0 for a base taken as level); sigma: of a joint
+    whose angle is measured, as the swing's always is; sigma_each: (n,) with those told by strokes,
+    None where there are none.
     """
 
     q: Array
     rates: Array
     sigma: float
+    sigma_each: Array | None
     unknown: tuple[int, ...]
     pitch: float
     roll: float
@@ -92,8 +95,9 @@ def joints_at(rig: Rig, streams: Streams, stamp: float) -> Arm:
     n = len(rig.continuous)
     entries, at = _series(streams.joints, stamp)
     q, rates, sigma = [math.nan] * n, [math.nan] * n, rig.config.sigma_joints
+    each: Array | None = None
     if entries:
-        q, rates, sigma = _joint_samples(rig, entries, at)
+        q, rates, sigma, each = _joint_samples(rig, entries, at)
     if not streams.joints.entries:
         rates = [0.0] * n  # left over from before a clock step: for drawing, at rest
     missing = any(map(math.isnan, q))
@@ -108,6 +112,7 @@ def joints_at(rig: Rig, streams: Streams, stamp: float) -> Arm:
         q=_known(q),
         rates=_known(rates),
         sigma=sigma,
+        sigma_each=None if each is None else np.maximum(each, sigma),
         unknown=tuple(k for k, value in enumerate(q) if math.isnan(value)),
         pitch=pitch,
         roll=roll,
@@ -143,8 +148,10 @@ def _known(values: list[float]) -> Array:
 
 def _joint_samples(
     rig: Rig, entries: tuple[Entry, ...], stamp: float
-) -> tuple[list[float], list[float], float]:
-    """(q, rates, sigma) at `stamp`; rates from the samples, or a line through the last 0.1 s."""
+) -> tuple[list[float], list[float], float, Array | None]:
+    """(q, rates, sigma, sigma of each) at `stamp`, the last as in `Arm`; rates from the samples, or
+    a line through the last 0.1 s.
+    """
     a, b, fraction, gap = bracket(entries, stamp)
     q = blend(a.value, b.value, fraction, rig.continuous)
     if a.velocity and b.velocity:
@@ -153,7 +160,7 @@ def _joint_samples(
         rows = recent(entries, stamp, JOINT_WINDOW)
         rates = slope([row.stamp for row in rows], [row.value for row in rows], rig.continuous)
     limit = rig.config.max_extrapolation
-    sigma = rig.config.sigma_joints
+    grown = 0.0
     if gap != 0.0:
         ahead = min(max(gap, 0.0), limit)
         q = tuple(value + rate * ahead for value, rate in zip(q, rates, strict=True))
@@ -161,8 +168,12 @@ def _joint_samples(
             extrapolation_sigma(min(abs(gap), LONGEST_GAP), rate, joint.max_acceleration, limit)
             for rate, joint in zip(rates, rig.machine.joints, strict=True)
         ]
-        sigma = math.hypot(sigma, max(0.0 if math.isnan(g) else g for g in growth))
-    return list(q), list(rates), sigma
+        grown = max(0.0 if math.isnan(g) else g for g in growth)
+    each = None
+    if a.sigmas or b.sigmas:
+        told = [row.sigmas or (0.0,) * len(q) for row in (a, b)]
+        each = np.hypot(np.max(told, axis=0), grown)
+    return list(q), list(rates), math.hypot(rig.config.sigma_joints, grown), each
 
 
 def yaw_at(rig: Rig, streams: Streams, stamp: float, M: Array, arm: Arm) -> Course:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
+from backend.fusion.joint_columns import columns_of
 from backend.fusion.rig import Rig
 from backend.fusion.samples import (
     AttitudeSample,
@@ -17,6 +17,8 @@ from backend.fusion.samples import (
     JointSample,
     ProjectedSample,
 )
+from backend.machine import strokes
+from backend.machine.strokes import Stroke
 from backend.spatial.types import Array
 
 MAX_STAMP = 1e11  # [s], some 3,000 years
@@ -32,7 +34,9 @@ class Entry(NamedTuple):
 
     value, velocity: joints [rad, rad/s] (value NaN where a joint is not published, velocity empty
     when unknown), position [m], heading [rad], or IMU quaternion (w, x, y, z) and rate [rad/s].
-    sigma: [m] or [rad], of one axis.
+    sigma: [m] or [rad], of one axis. Of joints only: sigmas, of each [rad], 0 where its angle is
+    measured, and empty where all are; missing: (joint, why its value is NaN in words)
+    where there is more to say than that it is not published.
     """
 
     stamp: float
@@ -41,57 +45,62 @@ class Entry(NamedTuple):
     velocity: tuple[float, ...]
     sigma: float
     fix: Fix = Fix.NONE
+    sigmas: tuple[float, ...] = ()
+    missing: tuple[tuple[int, str], ...] = ()
 
 
 def joints(rig: Rig, sample: JointSample) -> Entry | None:
     """All joints, or at least the swing (IMUs then give the others); further names are ignored.
 
-    None when the swing is missing, a name comes twice, lengths disagree, a value is not finite, is
+    Of a joint that a cylinder moves its stroke may come instead of the angle; one that is more than
+    5 mm outside those of the joint's range counts as not published, and `missing` says so.
+    None when the swing is missing, a joint comes twice, lengths disagree, a value is not finite, is
     more than half a radian beyond the joint's limits or turns faster than 10 rad/s.
     """
-    columns = _columns(sample.names, rig.columns, len(rig.continuous))
+    found = columns_of(sample.names, rig.columns, rig.cylinders, len(rig.continuous))
     n = len(sample.names)
-    if (
-        columns is None
-        or sample.position.shape != (n,)
-        or sample.velocity.shape not in ((n,), (0,))
-    ):
+    if found is None or sample.position.shape != (n,) or sample.velocity.shape not in ((n,), (0,)):
         return None
     position, velocity = sample.position.tolist(), sample.velocity.tolist()
-    values, rates = [], []
-    for column, low, high in zip(columns, rig.low, rig.high, strict=True):
+    values, rates, missing = [], [], list(found.missing)
+    sigmas = [0.0] * len(found.columns)
+    for k, (column, which) in enumerate(zip(found.columns, found.strokes, strict=True)):
         if column < 0:
             values.append(math.nan)
             rates.append(math.nan)
             continue
-        value = position[column]
-        if not low <= value <= high:  # false for NaN, too
+        value, rate = position[column], velocity[column] if velocity else math.nan
+        if which >= 0 and math.isfinite(value):
+            stroke = rig.machine.strokes[which]
+            angle = strokes.angle(stroke, value)
+            if math.isnan(angle):
+                missing.append((k, _outside(stroke, value)))
+                values.append(math.nan)
+                rates.append(math.nan)
+                continue
+            per_metre = float(strokes.rate(stroke, angle, 1.0))
+            sigmas[k] = rig.config.sigma_stroke * abs(per_metre)
+            value, rate = angle, rate * per_metre
+        if not rig.low[k] <= value <= rig.high[k]:  # false for NaN, too
+            return None
+        if velocity and not abs(rate) <= MAX_JOINT_RATE:
             return None
         values.append(value)
-        if velocity:
-            rate = velocity[column]
-            if not abs(rate) <= MAX_JOINT_RATE:
-                return None
-            rates.append(rate)
+        rates.append(rate)
     known = tuple(rates) if velocity else ()
-    return Entry(sample.stamp, sample.arrival, tuple(values), known, rig.config.sigma_joints)
+    return Entry(
+        sample.stamp,
+        sample.arrival,
+        tuple(values),
+        known,
+        rig.config.sigma_joints,
+        sigmas=tuple(sigmas) if any(sigmas) else (),
+        missing=tuple(missing),
+    )
 
 
-@lru_cache(maxsize=256)
-def _columns(
-    names: tuple[str, ...], known: tuple[tuple[str, int], ...], n: int
-) -> tuple[int, ...] | None:
-    """For every joint its column in `names` (-1 where it is missing); None if they do not fit."""
-    index = dict(known)
-    columns = [-1] * n
-    for column, name in enumerate(names):
-        joint = index.get(name)
-        if joint is None:
-            continue
-        if columns[joint] >= 0:
-            return None
-        columns[joint] = column
-    return tuple(columns) if columns[0] >= 0 else None
+def _outside(stroke: Stroke, read: float) -> str:
+    return f"cylinder reads {read:.3f} m, allowed: {stroke.shortest:.3f} to {stroke.longest:.3f} m"
 
 
 def fix(rig: Rig, sample: FixSample) -> Entry | None:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
+import numpy as np
+
 from backend.fusion.samples import Fix
 from backend.spatial.types import Array
 
@@ -37,7 +39,8 @@ class FusedPose:
 
     position: (3,) of the URDF root; yaw: of the root (tracks), CCW from grid east;
     joints, joint_velocities: (n,) in the order of Machine.joints [rad, rad/s];
-    base_velocity: (3,) [m/s]; yaw_rate: of the tracks [rad/s]; sigmas are standard deviations.
+    base_velocity: (3,) [m/s]; yaw_rate: of the tracks [rad/s]; sigmas are standard deviations:
+    sigma_joints of the least certain joint, sigma_each: (n,) of each, None where all have that.
     When validity is not VALID the last known values stay, for drawing only.
     """
 
@@ -59,3 +62,11 @@ class FusedPose:
     streams: dict[str, StreamStatus]  # "joints", "position", "heading", "attitude"
     clock_offset: tuple[float, float] | None  # bounds of local minus remote [s]
     yaw_rate: float = 0.0
+    sigma_each: Array | None = None
+
+    @property
+    def joint_sigmas(self) -> Array:
+        """(n,) standard deviation of each joint [rad]."""
+        if self.sigma_each is not None:
+            return self.sigma_each
+        return np.full(len(self.joints), self.sigma_joints)

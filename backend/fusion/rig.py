@@ -26,6 +26,7 @@ class FusionConfig:
     step_hold: float = 1.0  # how long a stepped clock keeps the pose UNKNOWN
     sigma_limit: float = 0.5  # a position known worse than this is UNKNOWN
     sigma_joints: float = 0.003  # JointState carries no covariance
+    sigma_stroke: float = 0.0005  # of a cylinder's sensor, in metres
     sigma_heading: float = 0.0035  # when the sensor states no variance
     sigma_tilt: float = 0.005  # when the IMU states no variance
     default_sigma: Mapping[Fix, float] = field(
@@ -83,7 +84,9 @@ class Imu:
 
 @dataclass(frozen=True)
 class Rig:
-    """One machine's sensors. columns: joint index by URDF name and by role; imus: by link name."""
+    """One machine's sensors. columns: joint index by URDF name and by role; cylinders:
+    (name in a JointState, index into Machine.strokes, joint that it moves); imus: by link name.
+    """
 
     name: str
     machine: Machine
@@ -98,6 +101,7 @@ class Rig:
     arm: tuple[Hop, ...]  # root to the last actuated part
     antenna: Swept  # position in the root frame [m]
     forward: Swept  # the heading sensor's axis in the root frame
+    cylinders: tuple[tuple[str, int, int], ...] = ()
 
 
 JOINT_TOLERANCE = 0.5  # sensors read a little beyond the stated limits [rad]
@@ -111,6 +115,10 @@ def make_rig(
     columns = {joint.name: k for k, joint in enumerate(machine.joints)}
     for k, joint in enumerate(machine.joints):
         columns.setdefault(joint.role, k)
+    cylinders: dict[str, tuple[str, int, int]] = {}
+    for k, stroke in enumerate(machine.strokes):
+        for cylinder in stroke.names:
+            cylinders.setdefault(cylinder, (cylinder, k, stroke.joint))
     finite = [
         (
             max(joint.lower - JOINT_TOLERANCE, -MOST_TURNS),
@@ -132,6 +140,7 @@ def make_rig(
         arm=hops(machine, _moved_by(machine, len(machine.joints) - 1), np.zeros(3)),
         antenna=_antenna(machine),
         forward=_forward(machine),
+        cylinders=tuple(cylinders.values()),
     )
 
 

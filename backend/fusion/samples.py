@@ -25,7 +25,11 @@ class Fix(Enum):
 
 @dataclass(frozen=True)
 class JointSample:
-    """names: as published (URDF names or roles); position: (n,) [rad]; velocity: (n,) or empty."""
+    """names: as published: URDF names or roles of joints, or names of cylinders (`Stroke.names`).
+
+    position: (n,) [rad], of a cylinder what its sensor reads [m]; velocity: (n,) [rad/s, m/s] or
+    empty.
+    """
 
     machine: str
     stamp: float

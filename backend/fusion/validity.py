@@ -101,7 +101,10 @@ def judge(
         reasons.append(f"machine's clock was stepped {max(0.0, since_step):.1f} s ago")
     reasons += [f"has sent no {WORDS[key]} yet" for key, had in seen.items() if not had]
     if seen["joints"]:
-        reasons += [f"{rig.machine.joints[k].role} angle is not published" for k in unknown]
+        why = _missing(streams) if unknown else {}
+        reasons += [
+            f"{rig.machine.joints[k].role} {why.get(k, 'angle is not published')}" for k in unknown
+        ]
     if fix is Fix.NONE and streams.position.received:
         reasons.append("has no GNSS fix")
     elif sigma_position > config.sigma_limit and status["position"].age <= limits["position"]:
@@ -131,6 +134,11 @@ def gnss_limit(rig: Rig, buffer: Buffer) -> float:
         return rig.config.gnss_stale
     period = (entries[-1].stamp - entries[0].stamp) / (len(entries) - 1)
     return min(max(rig.config.gnss_stale, 3.0 * period), rig.config.gnss_stale_most)
+
+
+def _missing(streams: Streams) -> dict[int, str]:
+    """By joint, what the newest of the samples that left it out have to say about it."""
+    return {joint: why for entry in streams.joints.entries for joint, why in entry.missing}
 
 
 def _old(what: str, age: float, plural: bool) -> str:

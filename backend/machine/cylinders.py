@@ -83,7 +83,8 @@ class Cylinder:
 
     barrel_pivot: (3,) in barrel_link; rod_pivot: (3,) in rod_link, None with a linkage [m].
     carried_by: the link in whose frame the bodies are. hinge: (3,) unit direction of the pins,
-    in carried_by's frame.
+    in carried_by's frame. barrel, rod: None where only the pins are stated. closed_length [m]: from
+    pin to pin where a stroke sensor reads 0; None for the shortest over the joint's range.
     """
 
     name: str
@@ -93,17 +94,27 @@ class Cylinder:
     rod_pivot: Array | None
     carried_by: str
     hinge: Array
-    barrel: Strut
-    rod: Strut
+    barrel: Strut | None = None
+    rod: Strut | None = None
     linkage: Linkage | None = None
+    closed_length: float | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "barrel_pivot", frozen(self.barrel_pivot, (3,), "barrel_pivot"))
         object.__setattr__(self, "hinge", frozen(self.hinge, (3,), "hinge"))
         if (self.rod_pivot is None) == (self.linkage is None):
             raise ValueError("give either rod_pivot or a linkage")
+        if (self.barrel is None) != (self.rod is None):
+            raise ValueError("give both barrel and rod, or neither")
         if self.rod_pivot is not None:
             object.__setattr__(self, "rod_pivot", frozen(self.rod_pivot, (3,), "rod_pivot"))
+
+    @property
+    def has_bodies(self) -> bool:
+        """Whether any part of it is stated, not only its pins."""
+        bar = self.linkage
+        of_bar = (None, None) if bar is None else (bar.rocker, bar.tie)
+        return any(part is not None for part in (self.barrel, self.rod, *of_bar))
 
     @property
     def links(self) -> tuple[str, ...]:
@@ -121,7 +132,7 @@ def strut_poses(cylinder: Cylinder, poses: Mapping[str, Array]) -> list[tuple[St
     T_barrel = T_carrier_any @ poses[cylinder.barrel_link]
     T_rod = T_carrier_any @ poses[cylinder.rod_link]
     foot = _point(T_barrel, cylinder.barrel_pivot)
-    placed: list[tuple[Strut, Array]] = []
+    parts: list[tuple[Strut | None, Array, Array]] = []  # its pin, and the way to the other
     linkage = cylinder.linkage
     if linkage is None:
         assert cylinder.rod_pivot is not None
@@ -131,12 +142,13 @@ def strut_poses(cylinder: Cylinder, poses: Mapping[str, Array]) -> list[tuple[St
         head = common_pin(
             a, c, linkage.rocker_length, linkage.tie_length, linkage.side, cylinder.hinge
         )
-        for strut, pin in ((linkage.rocker, a), (linkage.tie, c)):
-            if strut is not None:
-                placed.append((strut, _placed(strut, pin, head - pin, cylinder.hinge)))
-    placed.append((cylinder.barrel, _placed(cylinder.barrel, foot, head - foot, cylinder.hinge)))
-    placed.append((cylinder.rod, _placed(cylinder.rod, head, foot - head, cylinder.hinge)))
-    return placed
+        parts += [(linkage.rocker, a, head - a), (linkage.tie, c, head - c)]
+    parts += [(cylinder.barrel, foot, head - foot), (cylinder.rod, head, foot - head)]
+    return [
+        (strut, _placed(strut, pin, way, cylinder.hinge))
+        for strut, pin, way in parts
+        if strut is not None
+    ]
 
 
 def swept_triangles(cylinder: Cylinder, poses: Mapping[str, Array]) -> Array:
@@ -156,7 +168,9 @@ def swept_triangles(cylinder: Cylinder, poses: Mapping[str, Array]) -> Array:
 
 
 def stroke(cylinder: Cylinder, poses: Mapping[str, Array]) -> Array:
-    """Distance (k,) [m] between the barrel's and the rod's pin; `poses` as in `strut_poses`."""
+    """Distance (k,) [m] between the pins of barrel and rod as they are placed; `poses` as in
+    `strut_poses`. `strokes` tells it from the pins alone.
+    """
     (barrel, T_barrel), (rod, T_rod) = strut_poses(cylinder, poses)[-2:]
     return np.asarray(
         np.linalg.norm(_point(T_rod, rod.pin) - _point(T_barrel, barrel.pin), axis=-1)

@@ -6,10 +6,11 @@ barrel_link = "body_link"           # the URDF's link names
 barrel_pivot = [0.69, 0.0, 0.25]    # in that link's frame [m]
 rod_link = "boom_link"
 rod_pivot = [1.41, 0.0, 2.01]       # left out with a linkage
-carried_by = "boom_link"            # whose bodies enclose the sweep
+carried_by = "boom_link"            # whose bodies enclose the sweep; without bodies: the barrel's
 hinge = [0.0, 1.0, 0.0]             # direction of the pins, in carried_by's frame
+closed_length = 1.5                 # from pin to pin where its sensor reads 0; default: shortest
 
-[cylinder.barrel]                   # and the same for [cylinder.rod]
+[cylinder.barrel]                   # and the same for [cylinder.rod]; neither: no bodies, pins only
 mesh = "package://.../barrel.dae"   # as in the URDF
 pin = [0.0, 0.0, 0.0]               # its own pin, in the mesh's frame [m]
 toward = [0.56, 0.0, 1.55]          # a point of its axis, toward the other pin
@@ -86,16 +87,21 @@ class CylinderFields(_Table):
     barrel_pivot: Vector
     rod_link: str
     rod_pivot: Vector | None = None
-    carried_by: str
+    carried_by: str | None = None
     hinge: Vector = (0.0, 1.0, 0.0)
-    barrel: StrutTable
-    rod: StrutTable
+    barrel: StrutTable | None = None
+    rod: StrutTable | None = None
     linkage: LinkageTable | None = None
+    closed_length: Annotated[float, Field(ge=0.0, allow_inf_nan=False)] | None = None
 
     @model_validator(mode="after")
     def _either(self) -> CylinderFields:
         if (self.rod_pivot is None) == (self.linkage is None):
             raise ValueError("give either 'rod_pivot' or a 'linkage'")
+        if (self.barrel is None) != (self.rod is None):
+            raise ValueError("give both 'barrel' and 'rod', or neither for pins alone")
+        if self.barrel is not None and self.carried_by is None:
+            raise ValueError("give 'carried_by', the link whose bodies enclose the cylinder")
         return self
 
 
@@ -129,11 +135,12 @@ def read_cylinder(table: Mapping[str, object], load_mesh: LoadMesh, file: str) -
             barrel_pivot=np.array(t.barrel_pivot),
             rod_link=t.rod_link,
             rod_pivot=None if t.rod_pivot is None else np.array(t.rod_pivot),
-            carried_by=t.carried_by,
+            carried_by=t.carried_by or t.barrel_link,
             hinge=_unit(t.hinge),
-            barrel=_strut(t.barrel, load_mesh),
-            rod=_strut(t.rod, load_mesh),
+            barrel=None if t.barrel is None else _strut(t.barrel, load_mesh),
+            rod=None if t.rod is None else _strut(t.rod, load_mesh),
             linkage=linkage,
+            closed_length=t.closed_length,
         )
     except ValueError as error:
         raise InputError(f"{file}: {label}: {error}.") from None

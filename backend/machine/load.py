@@ -17,7 +17,9 @@ from backend.machine.meshes import visuals_of
 from backend.machine.model import PARTS, ROLES, Antenna, Joint, Link, Machine, Tracks
 from backend.machine.roles import assign_roles
 from backend.machine.sidecar import Sidecar, read_sidecar
-from backend.machine.sweeps import swept_by_cylinders
+from backend.machine.stroke_pins import strokes_of
+from backend.machine.strokes import Stroke
+from backend.machine.sweeps import cylinders_of, swept_by_cylinders
 from backend.machine.urdf import Description, UrdfJoint, parse
 from backend.spatial.boxes import Boxes
 from backend.spatial.types import Array, frozen
@@ -46,6 +48,7 @@ class _Description:
     joints: tuple[Joint, ...]
     links: tuple[Link, ...]
     swept: dict[int, Array]
+    strokes: tuple[Stroke, ...]
     notes: list[str]
 
 
@@ -94,6 +97,7 @@ def load_machine(
         payload=side.payload or 0.0,
         self_pairs=(),
         max_reach=float(np.hypot(sum(sun.lengths), arm.tip_lateral)),
+        strokes=d.strokes,
     )
     machine = replace(
         machine,
@@ -157,8 +161,10 @@ def _describe(
         for r, j in roles.items()
     )
     links = _links(robot, roles, robot_file, notes)
-    swept = swept_by_cylinders(links, joints, side, robot_file, side_name, progress)
-    return _Description(robot_file, robot, side, side_name, joints, links, swept, notes)
+    cylinders = cylinders_of(links, joints, side, robot_file, side_name)
+    swept = swept_by_cylinders(links, joints, cylinders, side_name, progress)
+    strokes = strokes_of(links, joints, cylinders, side_name)
+    return _Description(robot_file, robot, side, side_name, joints, links, swept, strokes, notes)
 
 
 def _locate(model: str, base_folder: Path | None) -> Path:

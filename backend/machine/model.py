@@ -11,6 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
+from backend.machine.strokes import Stroke
 from backend.spatial.boxes import Boxes
 from backend.spatial.types import AnyArray, Array, BoolArray, IntArray
 
@@ -172,6 +173,7 @@ class Machine:
     assumptions: tuple[str, ...] = field(default=())
     eye: Eye | None = None  # where the sidecar says it
     lidars: tuple[LidarMount, ...] = ()
+    strokes: tuple[Stroke, ...] = ()  # of the cylinders that the sidecar describes
 
     @property
     def lower(self) -> Array:

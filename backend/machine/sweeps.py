@@ -18,24 +18,21 @@ from backend.machine.sidecar import Sidecar
 from backend.spatial.types import Array
 
 
-def swept_by_cylinders(
+def cylinders_of(
     links: tuple[Link, ...],
     joints: tuple[Joint, ...],
     side: Sidecar,
     robot_file: Path,
     side_file: str,
-    progress: Progress | None,
-) -> dict[int, Array]:
-    """link index -> triangles (n, 3, 3) [m], in its frame, swept over the joints' whole ranges."""
+) -> tuple[tuple[Cylinder, int], ...]:
+    """The sidecar's cylinders, each with the one joint that moves it. Raises InputError."""
 
     def load_mesh(uri: str) -> Array:
         return mesh_triangles(find_mesh(uri, robot_file.parent, side_file))
 
-    swept: dict[int, list[Array]] = {}
+    found: list[tuple[Cylinder, int]] = []
     index = {link.name: i for i, link in enumerate(links)}
-    for k, table in enumerate(side.cylinder):
-        if progress is not None:
-            progress("sweeping cylinders", k / len(side.cylinder))
+    for table in side.cylinder:
         cylinder = read_cylinder(table, load_mesh, side_file)
         for name in cylinder.links:
             if name not in index:
@@ -43,8 +40,29 @@ def swept_by_cylinders(
                     f"{side_file}: cylinder {cylinder.name}: link '{name}' is not a link of the "
                     f"robot; its links are {', '.join(index)}."
                 )
-        own = [index[name] for name in cylinder.links]
-        joint = _moved_by(cylinder, joints_between(links, own), joints, side_file)
+        between = joints_between(links, [index[name] for name in cylinder.links])
+        found.append((cylinder, _moved_by(cylinder, between, joints, side_file)))
+    return tuple(found)
+
+
+def swept_by_cylinders(
+    links: tuple[Link, ...],
+    joints: tuple[Joint, ...],
+    cylinders: tuple[tuple[Cylinder, int], ...],
+    side_file: str,
+    progress: Progress | None,
+) -> dict[int, Array]:
+    """link index -> triangles (n, 3, 3) [m], in its frame, swept over the joints' whole ranges.
+
+    cylinders: those of `cylinders_of`; the ones of which only the pins are stated sweep nothing.
+    """
+    swept: dict[int, list[Array]] = {}
+    index = {link.name: i for i, link in enumerate(links)}
+    for k, (cylinder, joint) in enumerate(cylinders):
+        if progress is not None:
+            progress("sweeping cylinders", k / len(cylinders))
+        if not cylinder.has_bodies:
+            continue
         q = np.zeros((SAMPLES, len(joints)))
         q[:, joint] = np.linspace(joints[joint].lower, joints[joint].upper, SAMPLES)
         T_root = root_poses(links, q)

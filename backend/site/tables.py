@@ -101,12 +101,17 @@ class Start(Table):
 
 
 class MachineSim(Table):
-    """What a simulated machine does; `details` are the program's own fields."""
+    """What a simulated machine does; `details` are the program's own fields.
+
+    joints: what it publishes of the joints that cylinders move: "angles", or the cylinders'
+    "strokes", as a machine with stroke sensors does.
+    """
 
     model_config = ConfigDict(extra="allow")
 
     program: str = "hold"
     seed: Annotated[int, Field(ge=0)] = 0
+    joints: Literal["angles", "strokes"] = "angles"
 
     @property
     def details(self) -> dict[str, Any]:

@@ -20,7 +20,7 @@ from backend.machine.load import SHIPPED, load_machine
 from backend.machine.model import Machine
 from backend.machine.sidecar import read_sidecar
 from backend.machine.stated import left_out
-from backend.machine.sweeps import swept_by_cylinders
+from backend.machine.sweeps import cylinders_of, swept_by_cylinders
 from backend.spatial.boxes import Boxes
 from backend.spatial.types import Array
 
@@ -67,9 +67,9 @@ def zx200(xacro: Path) -> Machine:
 def swept(zx200: Machine, xacro: Path) -> dict[int, Array]:
     """Link index -> triangles of the cylinders over their whole strokes, in the link's frame."""
     sidecar = SHIPPED / "zx200.toml"
-    return swept_by_cylinders(
-        zx200.links, zx200.joints, read_sidecar(sidecar), xacro, str(sidecar), None
-    )
+    links, joints = zx200.links, zx200.joints
+    cylinders = cylinders_of(links, joints, read_sidecar(sidecar), xacro, str(sidecar))
+    return swept_by_cylinders(links, joints, cylinders, str(sidecar), None)
 
 
 def covered(boxes: Boxes, points: Array) -> Array:

@@ -13,7 +13,11 @@ import pytest
 from mcap.reader import make_reader
 from program import Done, cockpit
 
+from backend.errors import InputError
+from backend.fusion.rig import make_rig
+from backend.fusion.streams import Streams, ingest
 from backend.machine.load import load_machine
+from backend.machine.strokes import position
 from backend.machine.sun_map import sun_angles
 from backend.shell.link.codec import decode
 from backend.shell.session.can_map import CAN
@@ -144,6 +148,64 @@ def test_any_dbc_with_units_factors_and_the_machines_own_angles(tmp_path: Path) 
     )
     assert found["gnss/heading"].heading == pytest.approx(0.0, abs=1e-9)
     assert len(done.skipped) == 1
+
+
+LVDT = """VERSION ""
+NS_ :
+BS_:
+BU_: X
+BO_ 9 Arm: 6 X
+ SG_ boom : 0|16@1+ (0.1,0) [0|0] "mm" X
+ SG_ stick : 16|16@1- (0.001,0) [0|0] "rad" X
+ SG_ bucket : 32|16@1+ (0.01,0) [0|0] "cm" X
+"""
+STROKES = """dbc = "l.dbc"
+[[machine]]
+name = "a"
+[machine.joints]
+swing = { constant = 0.5, unit = "rad" }
+boom_cylinder = { signal = "Arm.boom", unit = "mm", offset = -20.0 }
+stick = { signal = "Arm.stick", unit = "rad" }
+bucket_cylinder = { signal = "Arm.bucket", unit = "cm" }
+"""
+
+
+def test_stroke_sensors_are_signals_in_units_of_length(tmp_path: Path) -> None:
+    (tmp_path / "l.dbc").write_text(LVDT)
+    (tmp_path / "l.toml").write_text(STROKES)
+    outlier = frame(1.1, 9, struct.pack("<HhH", 9000, -700, 1200))
+    rest = [frame(1.0 + k / 10, 9, struct.pack("<HhH", 2200, -700, 1200)) for k in (0, 2)]
+    log = write(tmp_path / "l.blf", [rest[0], outlier, rest[1]])
+    site = load_site(SITE)
+    done = convert(log, site, tmp_path / "o.mcap", can_map=tmp_path / "l.toml")
+    sample = next(s for _, suffix, _, s in samples(done.out) if suffix == "joint_states")
+    assert dict(zip(sample.names, sample.position.tolist(), strict=True)) == pytest.approx(
+        {"swing": 0.5, "boom_cylinder": 0.2, "stick": -0.7, "bucket_cylinder": 0.12}
+    )
+    assert any("9 Arm.boom" in problem.text for problem in done.problems)  # 0.68 m in 0.1 s
+    machine = load_machine("mini")
+    rig = make_rig("a", machine, site.frame)
+    (entry,) = ingest(rig, Streams(), sample).joints.entries
+    for k, read in ((1, 0.2), (3, 0.12)):
+        stroke = next(s for s in machine.strokes if s.joint == k)
+        assert float(position(stroke, entry.value[k])) == pytest.approx(read, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('"Arm.boom", unit = "mm"', '"Arm.boom", unit = "deg"', "boom_cylinder.unit is deg"),
+        ("boom_cylinder", "jib_cylinder", "jib_cylinder.*allowed are swing.*boom_cylinder"),
+        ("boom_cylinder", "tilt_cylinder", "tilt_cylinder is no cylinder of its sidecar"),
+        ("boom_cylinder", "swing_cylinder", "swing_cylinder"),
+    ],
+)
+def test_strokes_that_cannot_be_are_refused(tmp_path: Path, old: str, new: str, words: str) -> None:
+    (tmp_path / "l.dbc").write_text(LVDT)
+    (tmp_path / "l.toml").write_text(STROKES.replace(old, new))
+    log = write(tmp_path / "l.blf", [frame(1.0, 9, b"\0" * 6)])
+    with pytest.raises(InputError, match=words):
+        convert(log, load_site(SITE), tmp_path / "o.mcap", can_map=tmp_path / "l.toml")
 
 
 def test_floats_that_are_no_numbers_are_told(tmp_path: Path) -> None:

@@ -15,7 +15,9 @@ import pytest
 
 from backend.control.lease import Kind, Request
 from backend.errors import InputError
+from backend.fusion.rig import make_rig
 from backend.fusion.samples import ClockSample, FixSample, JointSample
+from backend.fusion.streams import Streams, ingest
 from backend.machine.load import load_machine
 from backend.shell.agent.gate import names_of
 from backend.shell.link.encode import encode_command, encode_limits
@@ -109,12 +111,12 @@ def heard(sample):
 
 
 @contextmanager
-def simulated(name="left", began=0.0, skew=0.0):
+def simulated(name="left", began=0.0, skew=0.0, site=SITE):
     """A cockpit with one machine, `began` seconds into its schedule, in a thread of its own."""
     endpoint = with_port("tcp/127.0.0.1:0")
     cockpit = Cockpit(endpoint, name)
     until = threading.Event()
-    arguments = (SITE, name, (endpoint,), time.time() - began, until, skew)
+    arguments = (site, name, (endpoint,), time.time() - began, until, skew)
     thread = threading.Thread(target=run, args=arguments, daemon=True)
     thread.start()
     try:
@@ -154,6 +156,25 @@ def test_streams_clock_and_commands():
         assert status.token == cockpit.token
         assert status.refused == 0
         assert 0 < status.accepted <= cockpit.sequence
+
+
+def test_a_machine_with_stroke_sensors_has_the_same_joints(tmp_path):
+    """Strokes over the wire, and what they tell of the joints, against the simulated truth."""
+    path = tmp_path / "strokes.toml"
+    text = SITE.path.read_text().replace("[machine.sim]", '[machine.sim]\njoints = "strokes"')
+    path.write_text(text.replace('program = "dig-swing-dump"', 'program = "hold"'))
+    site = load_site(str(path))
+    rig, streams = make_rig("left", MACHINE, site.frame), Streams()
+    with simulated(site=site) as cockpit:
+        cockpit.until(lambda: cockpit.count(JointSample) > 50 and cockpit.receiver.truths())
+        truth = cockpit.receiver.truths()["left"]
+    for sample in cockpit.samples:
+        if isinstance(sample, JointSample):
+            assert sample.names[1:] == ("boom_cylinder", "stick_cylinder", "bucket_cylinder")
+            streams = ingest(rig, streams, sample)
+    assert streams.joints.rejected == 0
+    mean = np.mean([entry.value for entry in streams.joints.entries], axis=0)
+    np.testing.assert_allclose(mean, truth.position, atol=1e-3)
 
 
 def test_cut_silences_everything_and_ends():

@@ -8,7 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from backend.errors import InputError
+from backend.fusion.rig import make_rig
 from backend.fusion.samples import AttitudeSample, FixSample, HeadingSample, JointSample
+from backend.fusion.streams import Streams, ingest
 from backend.machine.load import load_machine
 from backend.shell.link.codec import decode
 from backend.shell.link.topics import key
@@ -40,6 +43,39 @@ def read(site, machine=MACHINE, state=STATE, seed=0):
         )
         for s in sensors(machine, site)
     }
+
+
+def test_strokes_stand_in_for_the_angles_of_joints_with_cylinders():
+    site, errors = noiseless(), []
+    for machine, q in ((MACHINE, STATE.q), (load_machine("ex13"), [2.9, 1.082104, -0.6, 0.6])):
+        state = replace(STATE, q=np.array(q))
+        (measure,) = (
+            s.measure for s in sensors(machine, site, "strokes") if s.topic == "joint_states"
+        )
+        got = decode("left", "joint_states", measure(state, STAMP, np.random.default_rng(0)), 0.0)
+        assert got.names == ("swing_joint", "boom_cylinder", "stick_cylinder", "bucket_cylinder")
+        assert (np.abs(got.position[1:]) < 3.0).all()
+        rig = make_rig("left", machine, site.frame)
+        (entry,) = ingest(rig, Streams(), got).joints.entries
+        errors += [np.subtract(entry.value, state.q), np.subtract(entry.velocity, state.qd)]
+    np.testing.assert_allclose(errors, 0.0, atol=1e-9)
+
+
+def test_noise_of_strokes_is_that_of_the_angles():
+    (measure,) = (s.measure for s in sensors(MACHINE, SITE, "strokes") if s.topic == "joint_states")
+    rng, rig, found = np.random.default_rng(1), make_rig("left", MACHINE, SITE.frame), []
+    stopped = replace(STATE, q=np.array([0.7, 1.396263, -0.436332, 0.872665]))  # all at their ends
+    for state in (STATE, stopped):
+        for _ in range(150):
+            got = decode("left", "joint_states", measure(state, STAMP, rng), 0.0)
+            (entry,) = ingest(rig, Streams(), got).joints.entries
+            found.append(np.subtract(entry.value, state.q))
+    np.testing.assert_allclose(np.degrees(np.std(found, axis=0)), 0.05, rtol=0.15)
+
+
+def test_strokes_without_a_cylinder_are_refused():
+    with pytest.raises(InputError, match='describes no cylinder; allowed is "angles"'):
+        sensors(replace(MACHINE, strokes=()), SITE, "strokes")
 
 
 def noiseless():

@@ -137,7 +137,8 @@ TOPICS: tuple[Topic, ...] = (
         "{machine}/joint_states",
         "sensor_msgs/msg/JointState",
         "10–200",
-        "joint angles [rad] by URDF name or role, velocities [rad/s] if known",
+        "joint angles [rad] by URDF name or role, or strokes [m] by cylinder (`boom_cylinder`); "
+        "velocities [rad/s, m/s] if known",
     ),
     _pose(
         "imu",

@@ -12,11 +12,14 @@ from pydantic import Field, ValidationError, field_validator, model_validator
 
 from backend.errors import InputError
 from backend.machine.model import ROLES
+from backend.machine.stroke_pins import SUFFIX
 from backend.site.base import MachineName, Positive, Table
 from backend.site.messages import sentence
 from backend.site.site import Site
 
 CAN = Path(__file__).resolve().parents[3] / "scenes" / "can"
+
+CYLINDERS = tuple(f"{role}{SUFFIX}" for role in ROLES if role != "swing")
 
 _RADIANS = {"deg": math.pi / 180.0, "rad": 1.0}
 _METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001}
@@ -52,9 +55,11 @@ class Signal(Table):
 
 
 class Machine(Table):
-    """One machine of the site. angles: of boom, stick and bucket: "joint", the machine's own, or
-    "sun", each from the link before it, positive raises (Sun 2020, Fig. 2). heading: of the heading
-    sensor, counter-clockwise from east; latitude, longitude, altitude: of the antenna.
+    """One machine of the site. joints: by role, or the stroke of a joint's cylinder under
+    "boom_cylinder", "stick_cylinder", "bucket_cylinder" (`backend.machine.strokes`). angles: of
+    boom, stick and bucket: "joint", the machine's own, or "sun", each from the link before it,
+    positive raises (Sun 2020, Fig. 2). heading: of the heading sensor, counter-clockwise from east;
+    latitude, longitude, altitude: of the antenna.
     """
 
     name: MachineName
@@ -73,8 +78,9 @@ class Machine(Table):
     @classmethod
     def _roles(cls, joints: dict[str, Signal]) -> dict[str, Signal]:
         for role in joints:
-            if role not in ROLES:
-                raise ValueError(f'names the joint "{role}"; allowed are {", ".join(ROLES)}')
+            if role not in (*ROLES, *CYLINDERS):
+                allowed = ", ".join((*ROLES, *CYLINDERS))
+                raise ValueError(f'names the joint "{role}"; allowed are {allowed}')
         return joints
 
     @model_validator(mode="after")
@@ -88,7 +94,7 @@ class Machine(Table):
         if self.angles == "sun" and not {"boom", "stick", "bucket"} <= set(self.joints):
             raise ValueError('angles = "sun" needs boom, stick and bucket under joints')
         for name, signal in self.signals.items():
-            kind = _KINDS.get(name, "angle")
+            kind = _kind(name)
             if signal.unit not in _SCALES[kind]:
                 allowed = ", ".join(_SCALES[kind])
                 raise ValueError(f"{name}.unit is {signal.unit}; allowed are {allowed}")
@@ -129,8 +135,12 @@ class CanMap:
 
 def to_si(name: str, signal: Signal, value: float) -> float:
     """A decoded value in radians, metres, or degrees of latitude and longitude."""
-    scale = _SCALES[_KINDS.get(name, "angle")][signal.unit]
+    scale = _SCALES[_kind(name)][signal.unit]
     return (value * signal.factor + signal.offset) * scale
+
+
+def _kind(name: str) -> str:
+    return "length" if name in CYLINDERS else _KINDS.get(name, "angle")
 
 
 def shipped_maps() -> tuple[str, ...]:

@@ -7,13 +7,15 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from backend.errors import InputError
 from backend.fusion.plausible import MAX_JOINT_RATE
 from backend.machine.sun_map import from_sun_angles
-from backend.shell.session.can_map import Machine, Signal, to_si
+from backend.shell.session.can_map import CYLINDERS, Machine, Signal, to_si
 from backend.shell.session.format import Message
 from backend.shell.session.pose_messages import PoseMessages
 from backend.site.site import Site
 
+MAX_ROD_RATE = 2.0  # of a cylinder [m/s]
 _SHORTEST = 0.005  # [s] between two values of a signal, for rates
 _ANGLES = ("pitch", "roll", "heading")
 
@@ -31,7 +33,7 @@ class Gate:
         self._doubted: tuple[float, float] | None = None
 
     def passes(self, time: float, value: float) -> bool:
-        """time [s]; value [rad]."""
+        """time [s]; value [rad, or m below half a turn]."""
         near = any(
             self._near(known, time, value)
             for known in (self._last, self._doubted)
@@ -52,11 +54,20 @@ class MachineStreams:
     """Gathers what arrives frame by frame: a message goes out when all its signals are there.
 
     Joints that come in frames of their own are told together, at the time of the last of them.
+    Raises InputError for the stroke of a cylinder that the machine's sidecar does not describe.
     """
 
     def __init__(self, machine: Machine, site: Site) -> None:
         self._machine = machine
         self._encode = PoseMessages(site, machine.name)
+        known = [name for stroke in self._encode.machine.strokes for name in stroke.names]
+        for name in machine.joints:
+            if name in CYLINDERS and name not in known:
+                allowed = ", ".join(known) or "angles only"
+                raise InputError(
+                    f'machine "{machine.name}": joints.{name} is no cylinder of its sidecar; '
+                    f"allowed: {allowed}."
+                )
         self.signals = {name: s for name, s in machine.signals.items() if s.signal is not None}
         self._values = {
             name: to_si(name, signal, signal.constant)
@@ -121,9 +132,9 @@ class MachineStreams:
 
 
 def _rate(name: str, signal: Signal) -> float:
-    """The fastest believable change [rad/s]; a factor and an offset are no part of it."""
+    """The fastest believable change [rad/s, m/s]; a factor and an offset are no part of it."""
     if signal.max_rate is None:
-        return MAX_JOINT_RATE
+        return MAX_ROD_RATE if name in CYLINDERS else MAX_JOINT_RATE
     return abs(
         to_si(name, signal.model_copy(update={"offset": 0.0, "factor": 1.0}), signal.max_rate)
     )

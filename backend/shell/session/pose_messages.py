@@ -44,7 +44,7 @@ class PoseMessages:
         self._rig = make_rig(name, self.machine, site.frame)
 
     def joints(self, time: int, values: Mapping[str, float]) -> Message:
-        """values: by role [rad]; time: [ns since 1970]."""
+        """values: by role [rad], strokes by cylinder [m]; time: [ns since 1970]."""
         position = np.array(list(values.values()))
         data = encode_joint_states(time / 1e9, list(values), position, np.zeros(0))
         return self._message(time, "joint_states", data)

@@ -144,7 +144,7 @@ def _machine(
     agent, limits, lags = fresh(program), limits_of(machine), Hydraulics()
     rng = np.random.default_rng((program.seed, 1))
     state = on_schedule(program, begin, position, *start.attitude)
-    rig = sensors(machine, site)
+    rig = sensors(machine, site, entry.sim.joints)
     due, latest = [0.0] * len(rig), 0.0
     found = []
     for k in range(round(length / DT)):

@@ -97,7 +97,7 @@ def run_machine(
     # The computer's clock is read once: later corrections of it must not make time jump here.
     epoch = time.time() - time.monotonic()
     prefix = site.machine(name).prefix
-    rig = sensors(machine, site)
+    rig = sensors(machine, site, site.machine(name).sim.joints)
     wire = _Wire(
         {
             **{s.topic: publisher(session, s.topic, prefix, **s.fields) for s in rig},

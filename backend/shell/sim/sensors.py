@@ -13,9 +13,11 @@ from typing import TypeAlias
 
 import numpy as np
 
+from backend.errors import InputError
 from backend.fusion.samples import Fix
 from backend.machine.kinematics import link_poses
 from backend.machine.model import Machine
+from backend.machine.strokes import Stroke, length_and_slope
 from backend.shell.link.encode import (
     encode_fix,
     encode_heading,
@@ -45,15 +47,24 @@ class Sensor:
     measure: Measure
 
 
-def sensors(machine: Machine, site: Site) -> tuple[Sensor, ...]:
-    """The sensors of one machine on this site."""
+def sensors(machine: Machine, site: Site, joints: str = "angles") -> tuple[Sensor, ...]:
+    """The sensors of one machine on this site. joints: as in the site's `MachineSim`.
+
+    Raises InputError when strokes are asked for and the machine's sidecar has no cylinder.
+    """
     hardware = site.sim
+    cylinders = machine.strokes if joints == "strokes" else ()
+    if joints == "strokes" and not cylinders:
+        raise InputError(
+            f'machine "{machine.name}": sim.joints = "strokes", but its sidecar describes no '
+            'cylinder; allowed is "angles".'
+        )
     return (
         Sensor(
             "joint_states",
             {},
             hardware.joint_period,
-            _joints(machine, math.radians(hardware.joint_noise_deg)),
+            _joints(machine, cylinders, math.radians(hardware.joint_noise_deg)),
         ),
         Sensor("imu", {"link": "base"}, IMU_PERIOD, _base_imu(machine)),
         Sensor(
@@ -68,16 +79,24 @@ def sensors(machine: Machine, site: Site) -> tuple[Sensor, ...]:
     )
 
 
-def _joints(machine: Machine, sigma: float) -> Measure:
+def _joints(machine: Machine, cylinders: tuple[Stroke, ...], sigma: float) -> Measure:
+    """Angles, and strokes of `cylinders` whose noise is that of the angles times their levers."""
     names = [joint.name for joint in machine.joints]
+    by_joint = {stroke.joint: stroke for stroke in cylinders}
+    for k, stroke in by_joint.items():
+        names[k] = stroke.names[0]
     n = len(names)
     rate_sigma = RATE_NOISE if sigma > 0.0 else 0.0
 
     def measure(state: SimState, stamp: float, rng: np.random.Generator) -> bytes:
         noise = rng.standard_normal((2, n))
-        return encode_joint_states(
-            stamp, names, state.q + sigma * noise[0], state.qd + rate_sigma * noise[1]
-        )
+        position, velocity = state.q + sigma * noise[0], state.qd + rate_sigma * noise[1]
+        for k, stroke in by_joint.items():
+            q = np.clip(state.q[k], machine.joints[k].lower, machine.joints[k].upper)
+            length, lever = length_and_slope(stroke, q)
+            position[k] = length - stroke.closed_length + lever * (position[k] - q)
+            velocity[k] *= lever
+        return encode_joint_states(stamp, names, position, velocity)
 
     return measure
 
