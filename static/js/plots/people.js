@@ -59,8 +59,9 @@ function axisOverTime(g, place, k, now) {
   const origin = (state.site?.frame?.origin ?? [0, 0, 0])[k];
   const low = view.middle[k] - view.half, high = view.middle[k] + view.half;
   const marks = ticks(low + origin, high + origin, 4, [2, 5, 10, 20, 50, 100]).map((v) => [v - origin, String(((Math.round(v) % 1000) + 1000) % 1000).padStart(3, "0")]);
-  const across = { from: -PAST, to: AHEAD, marks: [[-PAST, `−${PAST} s`], [-10, "−10"], [0, "now"]] };
   const t = size("tick");
+  const between = place.right - place.left > 13 * t ? [[-10, "−10"]] : [];
+  const across = { from: -PAST, to: AHEAD, marks: [[-PAST, `−${PAST} s`], ...between, [0, "now"]] };
   const chart = frame(g, { ...place, right: place.right - 2.1 * t }, across, { from: low, to: high, marks }, `${"EN"[k]} ${grouped(Math.floor((view.middle[k] + origin) / 1000))}\u202f…, m`, "m");
   const { box, x, y } = chart;
   const at = (time, value) => [x(time - now), y(value)];
