@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel, Field
 
-from backend.safety.working_area import Area, WorkingArea
+from backend.safety.area_records import Area, WorkingArea
 
 
 class AreaModel(BaseModel):

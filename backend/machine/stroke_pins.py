@@ -29,8 +29,10 @@ def strokes_of(
 ) -> tuple[Stroke, ...]:
     """The strokes of cylinders with the joints that move them (`sweeps.cylinders_of`).
 
-    Raises InputError where the linkage does not close, or the length turns round (or all but stands
-    still, 0.01 m/rad) inside the joint's range: there one stroke has two joint angles, or none.
+    Where the linkage does not close, or the length turns round or all but stands still (0.01 m/rad)
+    inside the joint's range, one stroke has two joint angles, or none: a cylinder that states
+    bodies is then no stroke, and raises InputError only with `closed_length`; one that states only
+    its pins always does.
     """
     T_root = root_poses(links, np.zeros(len(joints)))
     strokes: list[Stroke] = []
@@ -38,7 +40,11 @@ def strokes_of(
         stroke = _placed(cylinder, joint, links, joints[joint], T_root, side_file)
         if stroke is not None:
             where = f"{side_file}: cylinder {cylinder.name}"
-            strokes.append(_tabulated(stroke, joints[joint], cylinder.closed_length, where))
+            try:
+                strokes.append(_tabulated(stroke, joints[joint], cylinder.closed_length, where))
+            except InputError:
+                if not cylinder.has_bodies or cylinder.closed_length is not None:
+                    raise
     return tuple(strokes)
 
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from backend.safety.area_records import Within
 from backend.safety.people import Risks
 from backend.safety.swing_risk import Boundaries
-from backend.safety.working_area import Within
 from backend.spatial.types import Array, IntArray
 
 PERSON, OBJECT = "person", "object"

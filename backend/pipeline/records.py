@@ -10,8 +10,8 @@ from backend.fusion.pose import FusedPose
 from backend.fusion.samples import Sample
 from backend.pipeline.people_records import People, Seen
 from backend.safety.alarms import Alarm
+from backend.safety.area_records import WorkingArea
 from backend.safety.record import Concern
-from backend.safety.working_area import WorkingArea
 from backend.site.gauge_choice import NO_CHOICE, GaugeChoice
 from backend.spatial.boxes import Boxes
 from backend.spatial.types import Array

@@ -13,7 +13,8 @@ from backend.machine.model import Machine
 from backend.pipeline.people import boxes_of, largest
 from backend.pipeline.people_records import Inside, People
 from backend.pipeline.records import Body3D, MachineState
-from backend.safety.working_area import Stand, Within, WorkingArea, unknown, within, working_area
+from backend.safety.area_records import Within, WorkingArea
+from backend.safety.working_area import Stand, unknown, within, working_area
 
 AHEAD = 1.0
 """How far ahead areas are predicted, counted from the cycle [s]."""

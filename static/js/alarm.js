@@ -10,6 +10,7 @@ import { acknowledge, acknowledged, sound } from "./sound.js";
 import { ageLevel, ageText } from "./head.js";
 import * as history from "./alarm_history.js";
 
+const SMALLEST = 0.7; // of the usual letters
 let line, detail, age;
 let shape = null;
 let listOpen = false;
@@ -55,6 +56,28 @@ function judge() {
   return { level: "CLEAR", line: `CLEAR · ${label(p.a)} ${partName(p.body_a)} ↔ ${label(p.b)} ${partName(p.body_b)} · ${metres(distance)}`, detail: "", key: `clear ${p.body_a} ${p.body_b}` };
 }
 
+/** What is blocked and what is free must be read to its end: in shorter words, then in smaller ones. */
+function fitted(text) {
+  const room = $("alarm-words").clientWidth - 2;
+  return wide(text) <= room ? text : text.replaceAll(" limited to ", " ≤ ");
+}
+
+function fit() {
+  const node = $("alarm-detail"), room = $("alarm-words").clientWidth - 2;
+  const scale = Math.max(SMALLEST, Math.min(1, room / Math.max(wide(node.textContent), 1)));
+  mark(node, "scale", scale < 1 ? scale.toFixed(2) : "");
+  const size = scale < 1 ? `${(scale * parseFloat(getComputedStyle($("alarm")).fontSize)).toFixed(1)}px` : "";
+  if (node.style.fontSize !== size) node.style.fontSize = size;
+}
+
+/** Of a text in the alarm's letters [px]. */
+function wide(text) {
+  const g = (wide.g ??= document.createElement("canvas").getContext("2d"));
+  const { fontSize, fontWeight, fontFamily } = getComputedStyle($("alarm"));
+  g.font = `${fontWeight} ${fontSize} ${fontFamily}`;
+  return g.measureText(text).width;
+}
+
 let send = () => {};
 
 /** give: sends a message to the server. */
@@ -87,7 +110,8 @@ export function update() {
   if (box.dataset.level !== now.level) line(now.line, `${now.key} now`);
   mark(box, "level", now.level);
   line(now.line, now.key);
-  detail(now.detail, now.key);
+  detail(fitted(now.detail), now.key);
+  fit();
   const howOld = snapshotAge();
   age(Number.isFinite(howOld) ? ageText(howOld) : "", ageLevel(howOld));
   if (shape !== now.level) {

@@ -123,6 +123,30 @@ def test_2_an_alarm_names_machine_part_distance_and_lever(look: Looked) -> None:
     assert box["y"] + box["height"] <= size["height"]
 
 
+def test_2_the_longest_advice_is_read_to_its_end(look: Looked) -> None:
+    """All joints and the tracks: what frees stands last."""
+    look.calm()
+    limits = ("swing left", "boom down", "stick out", "bucket dump", "drive ahead")
+    free = "swing right, boom up, stick in, bucket curl, drive back"
+    detail = f"{', '.join(f'{lever} limited to 12 %' for lever in limits)}. Free: {free}."
+    detail = detail[0].upper() + detail[1:]
+    alarm = {**ALARM, "detail": detail}
+    look.send(lambda: look.page.inner_text("#alarm-detail").endswith("back."), alarms=[alarm])
+    told, seen, wide = look.page.evaluate(
+        """() => { const node = document.getElementById("alarm-detail");
+          return [node.textContent, node.clientWidth, node.scrollWidth]; }"""
+    )
+    assert wide <= seen + 1
+    assert told.replace(" ≤ ", " limited to ") == detail
+    font = look.page.evaluate(
+        "() => parseFloat(getComputedStyle(document.getElementById('alarm-detail')).fontSize)"
+    )
+    assert font >= 11.0
+    # A short advice afterwards has its usual letters.
+    look.alarmed()
+    assert look.page.get_attribute("#alarm-detail", "data-scale") in (None, "")
+
+
 def luminance(colour: str) -> float:
     r, g, b = (int(colour[k : k + 2], 16) / 255 for k in (1, 3, 5))
     return 0.2126 * r + 0.7152 * g + 0.0722 * b

@@ -20,8 +20,8 @@ from backend.pipeline.config import Config
 from backend.pipeline.records import Snapshot
 from backend.pipeline.step import initial, step
 from backend.pipeline.working_area import area_of
+from backend.safety.area_records import Area, Within
 from backend.safety.people import Watch
-from backend.safety.working_area import Area, Within
 from backend.shell.app.models import SnapshotModel
 from backend.shell.app.wire import dumps
 from backend.shell.session.recorded_snapshot import recorded_snapshot

@@ -13,16 +13,8 @@ from backend.machine import kinematics
 from backend.machine.arm_extent import extent_of
 from backend.machine.load import load_machine
 from backend.machine.model import Machine
-from backend.safety.working_area import (
-    Area,
-    Stand,
-    Within,
-    WorkingArea,
-    touches,
-    unknown,
-    within,
-    working_area,
-)
+from backend.safety.area_records import Area, Within, WorkingArea
+from backend.safety.working_area import Stand, touches, unknown, within, working_area
 from backend.spatial import rotation, transform
 from backend.spatial.angles import wrap
 from backend.spatial.types import Array

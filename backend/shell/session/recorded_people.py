@@ -19,9 +19,9 @@ from backend.pipeline.people_records import (
     Sensor,
     Tracked,
 )
+from backend.safety.area_records import Within
 from backend.safety.people import Risks
 from backend.safety.swing_risk import Boundaries, Risk
-from backend.safety.working_area import Within
 from backend.spatial.types import Array
 from backend.tracking.records import Status
 
