@@ -25,6 +25,8 @@ _COV = _MEAN.copy()
 _COV[0] += 1.0 - ALPHA**2 + BETA
 _POINTS = _MEAN, _COV, _SPREAD
 _ALL = np.ones((MODELS, 1))
+STEPS_AHEAD = 4
+"""In which a prediction is made, models changing from one to the next."""
 
 
 class Modes(NamedTuple):
@@ -93,7 +95,9 @@ def _plain(modes: Modes) -> Modes:
     return Modes(*(np.ascontiguousarray(values, dtype=float) for values in modes))
 
 
-def ahead(modes: Modes, horizon: float, noise: Noise, steps: int = 4) -> tuple[Array, Array]:
+def ahead(
+    modes: Modes, horizon: float, noise: Noise, steps: int = STEPS_AHEAD
+) -> tuple[Array, Array]:
     """(n, 11), (n, 11, 11) where tracks will be after `horizon` [s], models changing on the way."""
     return mixture(foretold(modes, horizon / steps, noise, steps))
 
@@ -101,13 +105,16 @@ def ahead(modes: Modes, horizon: float, noise: Noise, steps: int = 4) -> tuple[A
 def born(place: Array, measured: tuple[int, ...], noise: Array, speed: float) -> Modes:
     """Modes of tracks seen for the first time. place: (k, d) measured values; speed [m/s]."""
     k = len(place)
-    mean, cov = np.zeros((k, STATE)), np.zeros((STATE, STATE))
+    mean = np.zeros((k, MODELS, STATE))
+    mean[:, :, measured] = place[:, None]
+    cov = np.empty((k, MODELS, STATE, STATE))
+    cov[:] = _first(measured, tuple(noise.tolist()), speed)
+    return Modes(mean, cov, np.full((k, MODELS), 1.0 / MODELS))
+
+
+@lru_cache(maxsize=64)
+def _first(measured: tuple[int, ...], noise: tuple[float, ...], speed: float) -> Array:
+    """(11, 11) of who is seen for the first time."""
     deviations = np.array([1.0, 1.0, speed, speed, 1.0, 0.1, np.pi / 2, 0.5, 0.5, 0.5, 0.5])
     deviations[list(measured)] = noise
-    mean[:, list(measured)] = place
-    cov[np.diag_indices(STATE)] = deviations**2
-    return Modes(
-        np.repeat(mean[:, None], MODELS, axis=1),
-        np.broadcast_to(cov, (k, MODELS, STATE, STATE)).copy(),
-        np.full((k, MODELS), 1.0 / MODELS),
-    )
+    return np.diag(deviations**2)

@@ -15,7 +15,7 @@ import numpy as np
 from backend.errors import InputError
 from backend.spatial.types import Array, BoolArray, IntArray
 from backend.tracking.association import associate
-from backend.tracking.imm import Modes, ahead, born, foretold, mixture
+from backend.tracking.imm import STEPS_AHEAD, Modes, ahead, born, foretold, mixture
 from backend.tracking.motion import MODELS, Noise
 from backend.tracking.records import (
     PX,
@@ -109,9 +109,25 @@ def now(tracks: Tracks) -> tuple[Array, Array]:
 
 
 def later(tracks: Tracks, horizon: float, noise: Noise | None = None) -> tuple[Array, Array]:
-    """(n, 11), (n, 11, 11) where the tracks will be after `horizon` [s] (Rasul 2021: 1 s)."""
+    """(n, 11), (n, 11, 11) where the tracks will be after `horizon` [s] (Rasul 2021: 1 s).
+
+    Who was seen once has no speed yet, and is foretold in one step: models that begin alike need
+    not change on the way.
+    """
+    noise = noise or Noise()
     modes = Modes(tracks.mean, tracks.cov, tracks.mode)
-    return ahead(modes, horizon, noise or Noise()) if len(tracks) else mixture(modes)
+    if not len(tracks):
+        return mixture(modes)
+    once = tracks.seen < 2
+    if not once.any():
+        return ahead(modes, horizon, noise)
+    mean, cov = np.empty((len(tracks), STATE)), np.empty((len(tracks), STATE, STATE))
+    for which, steps in ((once, 1), (~once, STEPS_AHEAD)):
+        some = np.flatnonzero(which)
+        if len(some):
+            picked = Modes(*(values[some] for values in modes))
+            mean[some], cov[some] = ahead(picked, horizon, noise, steps)
+    return mean, cov
 
 
 def _aged(tracks: Tracks, time: float, modes: Modes, hit: BoolArray, settings: Settings) -> Tracks:
@@ -167,10 +183,14 @@ def _begun(seen: Detections, free: IntArray, next_id: int, settings: Settings) -
 
 
 def _taken(tracks: Tracks, index: IntArray) -> Tracks:
+    if len(index) == len(tracks):
+        return tracks
     return Tracks(tracks.time, *(getattr(tracks, name)[index] for name in _FIELDS))
 
 
 def _joined(first: Tracks, second: Tracks) -> Tracks:
+    if not len(second):
+        return first
     return Tracks(
         second.time,
         *(np.concatenate([getattr(first, name), getattr(second, name)]) for name in _FIELDS),
