@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from backend.spatial.types import Array
-from backend.tracking.imm_kernels import advance, forward, mix, unscent
+from backend.spatial.types import Array, BoolArray
+from backend.tracking.imm_kernels import advance, ahead_each, forward, mix, unscent
 from backend.tracking.motion import CV, MODELS, RANDOM, Noise, jolts, moved, switching
 from backend.tracking.records import STATE
 
@@ -100,6 +100,20 @@ def ahead(
 ) -> tuple[Array, Array]:
     """(n, 11), (n, 11, 11) where tracks will be after `horizon` [s], models changing on the way."""
     return mixture(foretold(modes, horizon / steps, noise, steps))
+
+
+def ahead_of(modes: Modes, once: BoolArray, horizon: float, noise: Noise) -> tuple[Array, Array]:
+    """As `ahead`; of those who were seen `once` (n,) in one step."""
+    one, many = _step(horizon, noise), _step(horizon / STEPS_AHEAD, noise)
+    return ahead_each(  # type: ignore[no-any-return]
+        tuple(_plain(modes)),
+        once,
+        (one.change, one.F, one.Q, horizon),
+        (many.change, many.F, many.Q, horizon / STEPS_AHEAD),
+        STEPS_AHEAD,
+        _POINTS,
+        noise.turned,
+    )
 
 
 def born(place: Array, measured: tuple[int, ...], noise: Array, speed: float) -> Modes:

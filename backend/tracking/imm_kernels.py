@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from backend.spatial.types import Array
+from backend.spatial.types import Array, BoolArray
 from backend.tracking.motion import CT
 from backend.tracking.motion_kernel import turned
 from backend.tracking.records import PZ, TURN, VX, VY, VZ, YAW
@@ -199,3 +199,34 @@ def advance(
         mean, cov, mode = mix(mean, cov, mode, change)
         forward(mean, cov, F, Q, points, dt, fade)
     return mean, cov, mode
+
+
+@njit(cache=True, nogil=True)
+def ahead_each(
+    modes: tuple[Array, Array, Array],
+    once: BoolArray,
+    one: tuple[Array, Array, Array, float],
+    many: tuple[Array, Array, Array, float],
+    steps: int,
+    points: tuple[Array, Array, float],
+    fade: float,
+) -> tuple[Array, Array]:
+    """(n, s), (n, s, s) mixtures: of tracks that are `once` (n,) after one step, of the others
+    after `steps`. one, many: change, F, Q and dt [s] of such a step, as of `advance`.
+    """
+    mean, cov, mode = modes
+    n, r, s = mean.shape
+    to_mean, to_cov = np.empty((n, s)), np.empty((n, s, s))
+    for group in range(2):
+        chosen = np.flatnonzero(once if group == 0 else ~once)
+        if len(chosen) == 0:
+            continue
+        some = (mean[chosen], cov[chosen], mode[chosen])
+        if group == 0:
+            some = advance(some, one[0], one[1], one[2], points, one[3], fade, 1)
+        else:
+            some = advance(some, many[0], many[1], many[2], points, many[3], fade, steps)
+        mixed, spread, _ = mix(some[0], some[1], some[2], np.ones((r, 1)))
+        for k in range(len(chosen)):
+            to_mean[chosen[k]], to_cov[chosen[k]] = mixed[k, 0], spread[k, 0]
+    return to_mean, to_cov

@@ -13,14 +13,11 @@ from typing import NamedTuple
 import numpy as np
 
 from backend.errors import InputError
-from backend.spatial.types import Array, BoolArray, IntArray
+from backend.spatial.types import Array, IntArray
 from backend.tracking.association import associate
-from backend.tracking.imm import STEPS_AHEAD, Modes, ahead, born, foretold, mixture
+from backend.tracking.imm import Modes, ahead_of, born, foretold, mixture
 from backend.tracking.motion import MODELS, Noise
 from backend.tracking.records import (
-    PX,
-    PY,
-    PZ,
     STATE,
     Detections,
     Lost,
@@ -28,13 +25,11 @@ from backend.tracking.records import (
     Status,
     Tracks,
 )
+from backend.tracking.tracker_kernel import SEEN, age
 from backend.tracking.update import ratios, sight, updated
 
-_SEEN = 0.5  # probability above which a track counts as detected, or a detection as somebody's
-_SAME = 0.15  # tracks whose means are nearer than this are one [m]
 _LONGEST = 0.25  # [s] of one prediction
 _NONE = np.zeros(0, np.int64)
-_TENTATIVE, _CONFIRMED, _COASTING = (int(status) for status in Status)
 
 
 class Tracked(NamedTuple):
@@ -46,6 +41,14 @@ class Tracked(NamedTuple):
     next_id: int
     lost: tuple[Lost, ...]
     share: Array
+
+
+class _Aged(NamedTuple):
+    """All tracks after a scan, indices of those that go on, and the confirmed ones that do not."""
+
+    tracks: Tracks
+    kept: IntArray
+    lost: tuple[Lost, ...]
 
 
 def nothing(time: float = -math.inf) -> Tracks:
@@ -84,10 +87,8 @@ def track(
         found = sight(modes, seen, settings)
         share = associate(ratios(modes, found, seen, settings)).share
         modes = updated(modes, found, share)
-    hit = share.sum(axis=1) > _SEEN
-    after = _aged(tracks, seen.time, modes, hit, settings)
-    kept, lost = _kept(after, settings)
-    free = np.flatnonzero(share.sum(axis=0) < _SEEN)
+    after, kept, lost = _aged(tracks, seen.time, modes, share, settings)
+    free = np.flatnonzero(share.sum(axis=0) < SEEN)
     all_tracks = _joined(_taken(after, kept), _begun(seen, free, next_id, settings))
     return Tracked(all_tracks, next_id + len(free), lost, share)
 
@@ -118,59 +119,31 @@ def later(tracks: Tracks, horizon: float, noise: Noise | None = None) -> tuple[A
     modes = Modes(tracks.mean, tracks.cov, tracks.mode)
     if not len(tracks):
         return mixture(modes)
-    once = tracks.seen < 2
-    if not once.any():
-        return ahead(modes, horizon, noise)
-    mean, cov = np.empty((len(tracks), STATE)), np.empty((len(tracks), STATE, STATE))
-    for which, steps in ((once, 1), (~once, STEPS_AHEAD)):
-        some = np.flatnonzero(which)
-        if len(some):
-            picked = Modes(*(values[some] for values in modes))
-            mean[some], cov[some] = ahead(picked, horizon, noise, steps)
-    return mean, cov
+    return ahead_of(modes, tracks.seen < 2, horizon, noise)
 
 
-def _aged(tracks: Tracks, time: float, modes: Modes, hit: BoolArray, settings: Settings) -> Tracks:
-    scans, seen = tracks.scans + 1, tracks.seen + hit
-    sure = (tracks.status != _TENTATIVE) | (seen >= settings.confirm)
-    status = np.where(sure, np.where(hit, _CONFIRMED, _COASTING), _TENTATIVE)
-    last = np.where(hit, time, tracks.last_seen)
-    return Tracks(
-        time, modes.mean, modes.cov, modes.mode, tracks.id, status, scans, seen, last,
-    )  # fmt: skip
-
-
-def _kept(tracks: Tracks, settings: Settings) -> tuple[IntArray, tuple[Lost, ...]]:
-    """Indices of the tracks that go on, and the confirmed ones that do not."""
-    if not len(tracks):
-        return np.zeros(0, np.int64), ()
-    mean, cov = now(tracks)
-    tentative = tracks.status == _TENTATIVE
-    unseen = tracks.time - tracks.last_seen
-    too_long = unseen > np.where(tentative, settings.coast_tentative, settings.coast) + 1e-9
-    unsure = tentative & (tracks.scans >= settings.confirm_of)
-    vague = np.sqrt(np.maximum(cov[:, PX, PX], cov[:, PY, PY])) > settings.spread
-    twice = _twice(tracks, mean)
-    gone = too_long | unsure | vague | twice
-    lost = tuple(
-        Lost(int(tracks.id[i]), mean[i, [PX, PY, PZ]], float(tracks.last_seen[i]), tracks.time)
-        for i in np.flatnonzero(gone & ~tentative & ~twice)
+def _aged(tracks: Tracks, time: float, modes: Modes, share: Array, settings: Settings) -> _Aged:
+    """After a scan in which detections were each track's with probability `share` (n, k)."""
+    mean, cov, mode = (np.ascontiguousarray(values, dtype=float) for values in modes)
+    status, scans, seen, last, kept, lost, places = age(
+        (mean, cov, mode),
+        (tracks.status, tracks.scans, tracks.seen, tracks.last_seen, tracks.id),
+        np.ascontiguousarray(share),
+        time,
+        (settings.confirm, settings.confirm_of),
+        (settings.coast, settings.coast_tentative, settings.spread),
     )
-    return np.flatnonzero(~gone), lost
-
-
-def _twice(tracks: Tracks, mean: Array) -> BoolArray:
-    """(n,) tracks that follow what an older one follows."""
-    x, y = mean[:, PX], mean[:, PY]
-    near = np.hypot(x[:, None] - x, y[:, None] - y) < _SAME
-    younger = tracks.id[:, None] > tracks.id
-    return np.asarray((near & younger).any(axis=1) & (tracks.status == _TENTATIVE))
+    after = Tracks(time, mean, cov, mode, tracks.id, status, scans, seen, last)
+    gone = tuple(
+        Lost(int(tracks.id[i]), places[i], float(last[i]), time) for i in np.flatnonzero(lost)
+    )
+    return _Aged(after, np.flatnonzero(kept), gone)
 
 
 def _begun(seen: Detections, free: IntArray, next_id: int, settings: Settings) -> Tracks:
     modes = born(seen.values[free], seen.measured, seen.noise, settings.born_speed)
     k = len(free)
-    status = _CONFIRMED if settings.confirm == 1 else _TENTATIVE
+    status = Status.CONFIRMED if settings.confirm == 1 else Status.TENTATIVE
     return Tracks(
         seen.time,
         *modes,
