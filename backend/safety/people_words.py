@@ -25,6 +25,8 @@ def detail(concern: Concern, own: str, directions: tuple[tuple[str, str], ...]) 
 
     own: the machine's label; directions: per joint the words for its negative and positive motion.
     """
+    if concern.level is Level.UNKNOWN and not concern.reason.startswith("people:"):
+        return f"Clearance unknown: do not move {own}. Check radio and sensors of the one named."
     if concern.level is Level.UNKNOWN:
         return f"Nobody knows where people are: do not move {own}. Check its LiDAR."
     blocked, limited, free = [], [], []

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -69,9 +70,14 @@ def test_distances_as_the_page_writes_them(distance: float, text: str) -> None:
 
 def test_who_is_unknown_stops_in_words() -> None:
     blind = concern(Level.UNKNOWN, [[0.0, 0.0]] * len(MINI.joints), (0.0, 0.0))
-    assert words.line(blind, LABELS) == "UNKNOWN · no LiDAR data for 0.8 s"
+    blind = replace(blind, reason="people: no LiDAR data for 0.8 s")
+    assert words.line(blind, LABELS) == "UNKNOWN · people: no LiDAR data for 0.8 s"
     assert words.detail(blind, MINI, LABELS) == (
         "Nobody knows where people are: do not move LEFT. Check its LiDAR."
+    )
+    lost = replace(blind, reason="LEFT joint angles are 0.3 s old")
+    assert words.detail(lost, MINI, LABELS) == (
+        "Clearance unknown: do not move LEFT. Check radio and sensors of the one named."
     )
 
 
