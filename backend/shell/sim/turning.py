@@ -79,7 +79,7 @@ class TurningLidars:
         while not self._closing.is_set():
             now, state = time.monotonic(), self._state()
             if now >= due:
-                late = now - due > PERIOD / PARTS  # then some parts of the turn are left out
+                late = now - due > PERIOD / PARTS  # then this turn takes longer
                 due = now + PERIOD / PARTS if late else due + PERIOD / PARTS
                 if state is not None and state[1] > before:
                     before = state[1]
