@@ -13,7 +13,7 @@ import numpy as np
 
 from backend.machine.model import Machine
 from backend.spatial.types import Array, BoolArray
-from backend.stability.dynamics import Placed, Wrench, down, placed, wrench_of
+from backend.stability.dynamics import down, wrench_of
 from backend.stability.masses import MassModel
 from backend.stability.polygon import Polygon
 from backend.stability.zmp import moments_of, share, zmp_of
@@ -68,9 +68,7 @@ def brings_home(
     nudge = _NUDGE * np.eye(n)
     tried = np.concatenate([q[None], q - nudge, q + nudge])
     still = np.zeros_like(tried)
-    left = share(
-        zmp_of(wrench_of(model, placed(model, tried), still, still, down(T_site_root))), support
-    )
+    left = share(zmp_of(wrench_of(model, tried, still, still, down(T_site_root))), support)
     return np.asarray((left[1:] > left[0] + 1e-9).reshape(2, n).T)
 
 
@@ -107,18 +105,18 @@ def _worst(
     stood = np.clip(waited + 0.5 * v * np.abs(v) / hardest, machine.lower, machine.upper)
     postures = np.stack([np.broadcast_to(q, v.shape), waited, stood])
     moving = np.stack([v, v, np.zeros_like(v)])
-    at = placed(model, postures)
-    weight = wrench_of(model, at, moving, np.zeros_like(moving), down(T_site_root))
-    base = moments_of(weight, support)
-    from_own = moments_of(_alone(model, at, own, moving.shape), support)
-    from_others = moments_of(_alone(model, at, braking, moving.shape), support)
+    nothing, still = np.zeros(3), np.zeros_like(moving)
+    base = _moments(model, support, postures, moving, still, down(T_site_root))
+    from_own = _moments(model, support, postures, still, own, nothing)
+    from_others = _moments(model, support, postures, still, braking, nothing)
     least = base - np.abs(from_own) + np.minimum(from_others, 0.0)
     return np.asarray(least.min(axis=(0, -1)))
 
 
-def _alone(model: MassModel, at: Placed, qdd: Array, shape: tuple[int, ...]) -> Wrench:
-    still = np.zeros(3)
-    return wrench_of(model, at, np.zeros(shape), np.broadcast_to(qdd, shape), still)
+def _moments(
+    model: MassModel, support: Polygon, q: Array, qd: Array, qdd: Array, g: Array
+) -> Array:
+    return moments_of(wrench_of(model, q, qd, qdd, g), support)
 
 
 def _drive(v: Array, hardest: Array, lag: float) -> Array:

@@ -15,7 +15,7 @@ from backend.machine.inverse import inverse
 from backend.machine.model import Machine
 from backend.spatial import transform
 from backend.spatial.types import Array
-from backend.stability.dynamics import down, placed, wrench_of
+from backend.stability.dynamics import down, wrench_of
 from backend.stability.masses import MassModel, mass_model
 from backend.stability.polygon import Polygon, shrunk
 from backend.stability.zmp import moments_of
@@ -102,4 +102,4 @@ def farthest(chart: CapacityChart, payload: float) -> Array:
 
 def _static(model: MassModel, support: Polygon, q: Array, T_site_root: Array | None) -> Array:
     still = np.zeros(np.shape(q))
-    return moments_of(wrench_of(model, placed(model, q), still, still, down(T_site_root)), support)
+    return moments_of(wrench_of(model, q, still, still, down(T_site_root)), support)

@@ -15,6 +15,7 @@ import numpy as np
 
 from backend.spatial.types import Array
 from backend.stability.masses import GRAVITY, MassModel
+from backend.stability.wrench_kernel import wrenches
 
 
 class Wrench(NamedTuple):
@@ -24,19 +25,8 @@ class Wrench(NamedTuple):
     tau: Array
 
 
-class Placed(NamedTuple):
-    """Body frames in the root frame: R (B, ..., 3, 3), p (B, ..., 3) [m]; axes (B, ..., 3), of
-    their joints; coms (B, ..., 3) [m].
-    """
-
-    R: Array
-    p: Array
-    axes: Array
-    coms: Array
-
-
-def placed(model: MassModel, q: Array) -> Placed:
-    """The bodies at q (..., n) [rad]."""
+def centres(model: MassModel, q: Array) -> Array:
+    """(B, ..., 3) centre of mass of each body [m], root frame. q: (..., n) [rad]."""
     q = np.asarray(q, dtype=float)
     count, batch = len(model.masses), q.shape[:-1]
     R = np.empty((count, *batch, 3, 3))
@@ -56,9 +46,7 @@ def placed(model: MassModel, q: Array) -> Placed:
         R[b] = R[above] @ turned
         p[b] = R[above] @ p0[b] + p[above]
     lead = (slice(None), *([None] * len(batch)), slice(None), None)
-    axes = (R @ model.axes[lead])[..., 0]
-    coms = (R @ model.coms[lead])[..., 0] + p
-    return Placed(R, p, axes, coms)
+    return np.asarray((R @ model.coms[lead])[..., 0] + p)
 
 
 def down(T_site_root: Array | None) -> Array:
@@ -84,49 +72,30 @@ def ground_wrench(
     g = down(T_site_root)
     if base_acceleration is not None:
         g = g - np.asarray(base_acceleration, dtype=float)
-    return wrench_of(model, placed(model, q), qd, qdd, g)
+    return wrench_of(model, q, qd, qdd, g)
 
 
-def wrench_of(model: MassModel, at: Placed, qd: Array, qdd: Array, g: Array) -> Wrench:
-    """The same for bodies that are placed already. g: (..., 3) in the root frame [m/s^2]."""
-    qd, qdd, g = (np.asarray(x, dtype=float) for x in (qd, qdd, g))
-    batch = np.broadcast_shapes(at.p.shape[1:-1], qd.shape[:-1], qdd.shape[:-1], g.shape[:-1])
-    f, tau = np.zeros((*batch, 3)), np.zeros((*batch, 3))
-    still = np.zeros(3)
-    omega, alpha, origin = [still], [still], [still]  # by body; origin: acceleration of its frame
-    for b, mass in enumerate(model.masses):
-        above, k = model.parents[b], model.joints[b]
-        w, dw, a = still, still, still
-        if above >= 0:
-            w0, dw0, z = omega[above], alpha[above], at.axes[b]
-            r = at.p[b] - at.p[above]
-            turn = qd[..., k, None] * z
-            w = w0 + turn
-            dw = dw0 + qdd[..., k, None] * z + cross(w0, turn)
-            a = origin[above] + cross(dw0, r) + cross(w0, cross(w0, r))
-            omega.append(w)
-            alpha.append(dw)
-            origin.append(a)
-        c = at.coms[b] - at.p[b]
-        force = mass * (a + cross(dw, c) + cross(w, cross(w, c)) - g)
-        f += force
-        tau += cross(at.coms[b], force)
-        if above >= 0:
-            tensor = at.R[b] @ model.tensors[b] @ np.swapaxes(at.R[b], -1, -2)
-            spin = (tensor @ w[..., None])[..., 0]
-            tau += (tensor @ dw[..., None])[..., 0] + cross(w, spin)
-    return Wrench(f, tau)
+def wrench_of(model: MassModel, q: Array, qd: Array, qdd: Array, g: Array) -> Wrench:
+    """The same in a field g (..., 3) [m/s^2], root frame; zero for what motion alone needs."""
+    q, qd, qdd, g = (np.asarray(x, dtype=float) for x in (q, qd, qdd, g))
+    n = q.shape[-1]
+    batch = np.broadcast_shapes(q.shape[:-1], qd.shape[:-1], qdd.shape[:-1], g.shape[:-1])
+    states = [_rows(x, batch, n) for x in (q, qd, qdd)]
+    T = model.T_parent_joint
+    out = wrenches(
+        (model.parents, model.joints),
+        (np.ascontiguousarray(T[:, :3, :3]), np.ascontiguousarray(T[:, :3, 3]), model.axes),
+        (model.masses, model.coms, model.tensors),
+        *states,
+        _rows(g, batch, 3),
+    ).reshape(*batch, 6)
+    return Wrench(out[..., :3], out[..., 3:])
+
+
+def _rows(values: Array, batch: tuple[int, ...], width: int) -> Array:
+    return np.ascontiguousarray(np.broadcast_to(values, (*batch, width))).reshape(-1, width)
 
 
 def centre_of_mass(model: MassModel, q: Array) -> Array:
     """(..., 3) of everything [m], root frame. q: (..., n) [rad]."""
-    coms = placed(model, q).coms
-    return np.asarray(np.tensordot(model.masses, coms, 1) / model.total)
-
-
-def cross(a: Array, b: Array) -> Array:
-    """(..., 3) a x b; leading axes broadcast. numpy's own is slower."""
-    x = a[..., 1] * b[..., 2] - a[..., 2] * b[..., 1]
-    y = a[..., 2] * b[..., 0] - a[..., 0] * b[..., 2]
-    z = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
-    return np.stack([x, y, z], axis=-1)
+    return np.asarray(np.tensordot(model.masses, centres(model, q), 1) / model.total)

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from backend.spatial.types import Array
-from backend.stability.dynamics import placed
+from backend.stability.dynamics import centres
 from backend.stability.masses import GRAVITY, MassModel
 from backend.stability.polygon import Polygon
 
@@ -43,11 +43,11 @@ def two_masses(model: MassModel, support: Polygon, q: Array) -> TwoMasses:
 
     The edges are those of the box around the support polygon: exact for a rectangle.
     """
-    at = placed(model, q)
+    at = centres(model, q)
     moving = np.array([_carried(model, b) for b in range(len(model.masses))])
     M, m = model.masses[~moving].sum(), model.masses[moving].sum()
-    still = np.tensordot(model.masses[~moving], at.coms[~moving], 1) / M
-    r_TB = np.tensordot(model.masses[moving], at.coms[moving], 1) / m - still
+    still = np.tensordot(model.masses[~moving], at[~moving], 1) / M
+    r_TB = np.tensordot(model.masses[moving], at[moving], 1) / m - still
     low, high = support.vertices.min(axis=0), support.vertices.max(axis=0)
     half = np.where(r_TB[..., :2] >= 0.0, high - still[..., :2], still[..., :2] - low)
     batch = r_TB.shape[:-1]

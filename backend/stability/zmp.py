@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from backend.spatial.types import Array
-from backend.stability.dynamics import Wrench, down, ground_wrench, placed, wrench_of
+from backend.stability.dynamics import Wrench, down, ground_wrench, wrench_of
 from backend.stability.masses import MassModel
 from backend.stability.polygon import Polygon
 
@@ -99,9 +99,8 @@ def edge_moment_terms(
     qdd = dq_ds sdd + ddq_dss sd^2.
     """
     q, first, second = (np.asarray(x, dtype=float) for x in (q, dq_ds, ddq_dss))
-    at, g = placed(model, q), down(T_site_root)
-    still = np.zeros_like(first)
-    a = wrench_of(model, at, still, first, np.zeros(3))
-    b = wrench_of(model, at, first, second, np.zeros(3))
-    c = wrench_of(model, at, still, still, g)
+    nothing, still = np.zeros(3), np.zeros_like(first)
+    a = wrench_of(model, q, still, first, nothing)
+    b = wrench_of(model, q, first, second, nothing)
+    c = wrench_of(model, q, still, still, down(T_site_root))
     return moments_of(a, support), moments_of(b, support), moments_of(c, support)
