@@ -78,6 +78,8 @@ LIBRARIES: dict[str, str | tuple[str, ...]] = {
     "fastapi_offline": "backend.shell.app",
     "starlette": "backend.shell.app",
     "uvicorn": "backend.shell.app",
+    "toppra": "backend.planning.trajectory.timing",
+    "casadi": "backend.planning.trajectory.timing",
     "viser": "cockpit.views",
 }
 
@@ -156,7 +158,7 @@ def test_every_import_is_a_declared_dependency(repository: Path) -> None:
         "scikit-learn": "sklearn",
     }
     extras = project["optional-dependencies"]
-    names = [*project["dependencies"], *extras["ifc"], *extras["ground"]]
+    names = [*project["dependencies"], *extras["ifc"], *extras["ground"], *extras["planning"]]
     declared = {aliases.get(name, name).replace("-", "_") for name in names}
     for path in sources():
         for name in imports_of(path):

@@ -44,6 +44,27 @@ class FclScene:
             ]
         )
 
+    def least_along(self, half_extents: Array, centers: Array, rotations: Array) -> Array:
+        """(m,) least distance of b boxes in m places to all objects, 0 where they touch [m].
+
+        half_extents: (b, 3); centers: (m, b, 3) [m]; rotations: (m, b, 3, 3).
+        """
+        moved = [fcl_box(np.zeros(3), np.eye(3), np.asarray(half)) for half in half_extents]
+        still, moving = (fcl.DynamicAABBTreeCollisionManager() for _ in range(2))
+        still.registerObjects(self._objects)
+        moving.registerObjects(moved)
+        still.setup()
+        moving.setup()
+        found = np.empty(len(centers))
+        for m in range(len(centers)):
+            for one, center, rotation in zip(moved, centers[m], rotations[m], strict=True):
+                one.setTransform(fcl.Transform(rotation, center))
+            moving.update()
+            data = fcl.DistanceData()
+            moving.distance(still, data, fcl.defaultDistanceCallback)
+            found[m] = max(float(data.result.min_distance), 0.0)
+        return found
+
     def by_manager(self, links: Boxes) -> Array:
         """(links,) the same by the broad-phase manager, one query for each link [m]."""
         if self._manager is None:
