@@ -17,7 +17,7 @@ from backend.spatial import transform
 from backend.spatial.types import Array
 
 _TURN = 2.0 * np.pi
-_OTHERS = np.deg2rad(np.arange(5.0, 95.0, 5.0))
+_OTHERS = np.deg2rad(np.arange(5.0, 155.0, 5.0))
 """How far the attitude at the goal may leave the present one where none is stated [rad]."""
 
 

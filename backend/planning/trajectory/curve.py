@@ -12,7 +12,7 @@ from backend.machine.model import Machine
 from backend.planning.trajectory.sweep import Sweep
 from backend.spatial.types import Array
 
-SPACINGS = (1.2, 0.6, 0.3, 0.15, 0.08, 0.04, 0.02)
+SPACINGS = (1.2, 0.6, 0.3, 0.15, 0.08, 0.04, 0.02, 0.01)
 """Of control points along the way, tried in turn: time at full speed [s]."""
 _SAGITTA = 2e-3  # [m] that a point may leave the chords that are checked
 
@@ -28,6 +28,11 @@ class Curve:
         """(..., n) of the order-th derivative at s (...)."""
         held = (self.spline, self._first, self._second)[order]
         return np.asarray(held(np.clip(s, 0.0, self.length)))
+
+    @property
+    def spans(self) -> int:
+        """Polynomial pieces."""
+        return len(self.spline.c) - 3
 
     @cached_property
     def _first(self) -> BSpline:

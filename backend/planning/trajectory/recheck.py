@@ -49,6 +49,14 @@ def recheck(
     )
 
 
+def overdone(machine: Machine, task: Task, curve: Curve, time: Timed) -> float:
+    """By what factor the timing must be slowed so that no joint is too fast between grid points."""
+    _, rates, accelerations = time.sampled(curve, _instants(machine, curve, time))
+    rate = float((np.abs(rates) / task.max_velocity(machine)).max())
+    hard = float((np.abs(accelerations) / task.max_acceleration(machine)).max())
+    return max(1.0, rate, float(np.sqrt(hard)))
+
+
 def _by_fcl(machine: Machine, obstacles: Obstacles, q: Array) -> float:
     """Shortest distance by python-fcl of what moves to the obstacles, in postures (m, n) [m]."""
     if not len(obstacles.boxes):

@@ -21,7 +21,8 @@ GROUND = 0.02
 CONTACT = 0.01
 """Nearer than this counts as touching [m]."""
 THE_GROUND = "the ground"
-_KEPT = 0.5  # of the distance at samples that holds between them, too
+_KEPT = 0.8  # of the distance at samples that holds between them, too
+_MORE = 1.15  # times the distances asked for are kept by a way that is rounded off later
 
 
 @dataclass(frozen=True)
@@ -63,7 +64,7 @@ class Sweep:
 
     def blocked(self, points: Array) -> str | None:
         """What is in the way along the polyline (m, n), None where all of it is free: no pair comes
-        nearer than its distance at the samples, or half of that between them.
+        nearer than its distance at the samples, or 0.8 of that between them.
         """
         for a, b in pairwise(points):
             _, pair, _ = sweep_kernels.advance(
@@ -72,6 +73,18 @@ class Sweep:
             if pair >= 0:
                 return self.names[pair]
         return None
+
+    @property
+    def kept(self) -> float:
+        """The least that any pair with an obstacle keeps [m], the ground not counted."""
+        outer = [not name.startswith("its own") and name != THE_GROUND for name in self.names]
+        return float(self.pairs[3][outer].min(initial=np.inf))
+
+    def widened(self, q: Array) -> Sweep:
+        """With more distance where postures (m, n) have it: room for a way to be rounded off."""
+        room = np.min([self.distances(posture) for posture in q], axis=0)
+        clear = np.maximum(self.pairs[2], np.minimum(_MORE * self.pairs[2], room - 1e-9))
+        return replace(self, pairs=(*self.pairs[:2], clear, _KEPT * clear, self.pairs[4]))
 
     def relaxed(self, q: Array) -> Sweep:
         """With the distances of q (n,) where they are shorter: nothing comes nearer than it is."""

@@ -23,7 +23,7 @@ _TURN = 0.05  # [rad] of swing
 _LIFTS = (0.0, 0.5, 1.0, 1.6, 2.4)  # [m] above the asked lift
 _INWARDS = (1.0, 0.8, 0.6)  # of the shorter of both reaches
 _LONGEST = 0.6  # [s] of one step of the search at full speed
-_LEAST = 1e-9
+_ATTEMPTS = 3  # at a way on which the machine does not tip
 
 Stands = Callable[[Array], bool]
 """Whether the machine stands without tipping at rest in postures (m, n)."""
@@ -47,7 +47,9 @@ def find_way(
 ) -> Way | Refusal:
     """A free way from task.q to one of goals (g, n). stands: what is asked of every posture."""
     toppled, blockers = False, dict[str, int]()
-    for goal in goals:
+    found: list[Way] = []
+    hits = np.zeros(len(sweep.names), np.int64)
+    for number, goal in enumerate(goals):
         for points, how in _moves(machine, task, goal):
             hit = sweep.blocked(points)
             if hit is not None:
@@ -55,15 +57,20 @@ def find_way(
             elif not stands(points):
                 toppled = True
             else:
-                return Way(points, how)
-    hits = np.zeros(len(sweep.names), np.int64)
-    for attempt in range(3):
+                found.append(Way(points, how if number == 0 else f"the other way round, {how}"))
+                break
+        if number == 0 and found:
+            return found[0]
+    for attempt in range(_ATTEMPTS):
         points = search(machine, task, sweep, carry, goals, hits, task.seed + attempt)
         if not len(points):
             break
         if stands(np.concatenate([_dense(a, b) for a, b in pairwise(points)])):
-            return Way(points, "found by a search from both ends")
+            found.append(Way(points, "found by a search from both ends"))
+            break
         toppled = True
+    if found:
+        return min(found, key=lambda way: _least_time(machine, way.points))
     if toppled:
         return Refusal("tips", "every way that was found tips the machine over.")
     order = np.argsort(-hits, kind="stable")
@@ -155,6 +162,11 @@ def _posed(
     if inside and ends < 1e-3:
         q[0], q[-1] = task.q, goal
         yield q, how
+
+
+def _least_time(machine: Machine, points: Array) -> float:
+    """Of a polyline (m, n) at full speed [s]."""
+    return float((np.abs(np.diff(points, axis=0)) / machine.max_velocity).max(axis=1).sum())
 
 
 def _dense(a: Array, b: Array) -> Array:
