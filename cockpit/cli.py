@@ -27,6 +27,7 @@ from cockpit.cli_entry import (
 from cockpit.cli_formats import convert, export
 from cockpit.cli_gauge import gauge
 from cockpit.cli_keys import LinkConfig, keys
+from cockpit.cli_plan import plan
 from cockpit.cli_playback import add_commands
 from cockpit.cli_recordings import recordings
 from cockpit.cli_track import track
@@ -324,6 +325,7 @@ app.command()(gauge)
 app.command()(detect)
 app.command()(track)
 app.command()(along)
+app.command()(plan)
 
 
 def _interrupted() -> threading.Event:

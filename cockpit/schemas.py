@@ -23,6 +23,7 @@ from backend.documents.detection import DetectionDocument
 from backend.documents.gauge import GaugeDocument
 from backend.documents.gauge_choice import GaugeChoiceFile, GaugeStateDocument
 from backend.documents.people import PeopleModel
+from backend.documents.plan_document import PlanDocument, PlanTaskDocument
 from backend.documents.recordings import RecordingsDocument, RecoverDocument
 from backend.documents.session import DiffDocument, SeriesDocument, SessionDocument
 from backend.documents.stages import StagesDocument
@@ -40,6 +41,8 @@ SCHEMAS: dict[str, tuple[type[BaseModel], str]] = {
     "gauge": (GaugeDocument, "what gauge --json prints"),
     "detection": (DetectionDocument, "what detect --json prints"),
     "stages": (StagesDocument, "/api/stages: what detection makes of the newest scan"),
+    "plan-task": (PlanTaskDocument, "the task that plan reads"),
+    "plan": (PlanDocument, "what plan --json prints"),
     "along": (AlongDocument, "what along --json prints"),
     "gauge-choice": (GaugeChoiceFile, "what operators draw and switch, as it is kept"),
     "gauge-state": (GaugeStateDocument, "/api/gauge"),

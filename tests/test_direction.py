@@ -46,6 +46,7 @@ ROOMS: dict[str, set[str]] = {
         *("backend.site", "backend.machine", "backend.spatial", "backend.errors"),
     },
     "backend.documents": {
+        "backend.planning",
         "backend.stability",
         *("backend.pipeline", "backend.safety", "backend.cspace", "backend.collision"),
         *("backend.gauge", "backend.site", "backend.fusion", "backend.machine"),

@@ -51,9 +51,9 @@ class Task:
     where that cannot be, takes the nearest that can. band: how far the attitude may leave those of
     start and goal on the way [rad]. payload [kg]. clearance: to obstacles [m]. lift: how far
     above the higher of start and goal the end point is carried [m]. share: of the way from the
-    support polygon's centre to its edges that the ZMP leaves free. slow: (n,) factors 0..1 of the
-    joints' speeds and accelerations. T_site_root: (4, 4), of which only the slope counts; level
-    when None.
+    support polygon's centre to its edges that the ZMP leaves free. speeds, accelerations: (n,)
+    lower than the machine's own [rad/s, rad/s^2]. T_site_root: (4, 4), of which only the slope
+    counts; level when None.
     """
 
     q: Array
@@ -146,7 +146,9 @@ class Refusal:
 def _lower(most: Array, asked: Array | None, what: str) -> Array:
     if asked is None:
         return most
-    asked = frozen(asked, most.shape, what)
+    asked = np.asarray(asked, dtype=float)
+    if asked.shape != most.shape:
+        raise InputError(f"task: {what} needs {len(most)} values, one a joint.")
     if not (asked > 0.0).all():
         raise InputError(f"task: {what} must be above 0.")
     return np.asarray(np.minimum(most, asked))
