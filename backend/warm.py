@@ -30,6 +30,7 @@ from backend.pipeline.place import place
 from backend.pipeline.records import Body3D
 from backend.pipeline.watch import Cloud, Watched, watch
 from backend.planning.live import rehearse
+from backend.planning.trajectory import plan as trajectory
 from backend.safety.approach import Motion, approach
 from backend.safety.limiter import Wish, limit, open_latch
 from backend.safety.limits import Delay
@@ -73,6 +74,7 @@ def compile_kernels() -> None:
     area = working_area(machine, Stand(q, q, *(0.0,) * 2, q[:2], *(0.0,) * 6), 1.0)
     within(area, np.zeros((1, 2)), np.zeros(1))
     rehearse(machine)
+    trajectory.rehearse(machine)
     empty = Watched()
     cloud = Cloud("own", "lidar", 0.0, _GROUND, np.eye(4), near)
     watch(watch(empty, (cloud,))[0], (cloud,))

@@ -7,6 +7,7 @@ from typing import Literal
 import numpy as np
 
 from backend.errors import InputError
+from backend.machine.kinematics import end_point
 from backend.machine.model import Machine
 from backend.planning.trajectory.carry import attitude_of, carry_of, goals
 from backend.planning.trajectory.curve import Curve, free_curve
@@ -15,7 +16,7 @@ from backend.planning.trajectory.records import Checks, Obstacles, Refusal, Task
 from backend.planning.trajectory.rows import limit_rows
 from backend.planning.trajectory.sweep import CONTACT, Sweep, make_sweep
 from backend.planning.trajectory.timing import Timed, casadi_timing, toppra_timing
-from backend.planning.trajectory.way import Way, find_way
+from backend.planning.trajectory.way import Way, find_way, search
 from backend.spatial.types import Array
 from backend.stability.dynamics import down, wrench_of
 from backend.stability.masses import MassModel, mass_model, why_unknown
@@ -26,6 +27,7 @@ Method = Literal["toppra", "casadi"]
 METHODS: tuple[Method, ...] = ("toppra", "casadi")
 STEP = 0.05
 """Between two rows of the result [s]."""
+_RESERVE = 1.004  # for what lies between the samples of that
 INTERVALS = (160, 800)
 """Fewest and most on the grid of the timing."""
 
@@ -72,7 +74,7 @@ def plan(
     if time is None:
         return Refusal("timing", "no timing keeps the limits along the way that was found.")
     # Limits hold at grid points; what they are exceeded by between them is made up for.
-    time = time.slowed(overdone(machine, task, curve, time))
+    time = time.slowed(_RESERVE * overdone(machine, task, curve, time))
     checks = recheck(machine, task, obstacles, sweep, curve, time, masses, whole)
     why = _failed(task, sweep, checks)
     if why:
@@ -141,3 +143,17 @@ def _trajectory(
     t = time.times(STEP)
     q, rates, accelerations = time.sampled(curve, t)
     return Trajectory(t, q, rates, accelerations, method, way.how, checks, notes)
+
+
+def rehearse(machine: Machine) -> None:
+    """Makes the compiled parts ready: a task without and one with something in the way."""
+    low = np.where(np.isfinite(machine.lower), machine.lower, -1.0)
+    high = np.where(np.isfinite(machine.upper), machine.upper, 1.0)
+    q = 0.5 * (low + high)
+    q[4:] = 0.0
+    goal = q.copy()
+    goal[0] += 0.5
+    task = Task(q, end_point(machine, goal), band=0.2)
+    sweep, carry = make_sweep(machine, Obstacles(), task.clearance), carry_of(machine, q)
+    search(machine, task, sweep, carry, goal[None], np.zeros(len(sweep.names), np.int64), 0, 50)
+    plan(machine, task, Obstacles())
