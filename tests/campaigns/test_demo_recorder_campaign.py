@@ -69,7 +69,18 @@ def test_kills_of_the_demo(tmp_path: Path) -> None:
     for run in range(KILLS // 2):
         folder = tmp_path / f"run{run}"
         demo = subprocess.Popen(
-            [sys.executable, "-m", "cockpit.cli", "demo", "--port", "0", "--no-browser", "--no-login", "--record", str(folder)],
+            [
+                sys.executable,
+                "-m",
+                "cockpit.cli",
+                "demo",
+                "--port",
+                "0",
+                "--no-browser",
+                "--no-login",
+                "--record",
+                str(folder),
+            ],
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
             env=live.ENVIRONMENT,
