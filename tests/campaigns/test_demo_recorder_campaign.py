@@ -119,7 +119,7 @@ def test_kills_of_the_process_that_writes_the_demo(tmp_path: Path) -> None:
     with live.backend("demo", "--record", str(folder)) as running:
         running.wait_for(live.all_valid)
         pid = 0
-        for _ in range(KILLS - KILLS // 2):
+        for _ in range(KILLS):
             pid = wait_for_writer(folder, pid)
             time.sleep(rng.uniform(0.02, 1.5))
             os.kill(pid, signal.SIGKILL)
