@@ -43,6 +43,9 @@ from backend.site.named_bodies import SiteBodies
 from backend.spatial import rotation, transform
 from backend.spatial.boxes import Boxes
 from backend.spatial.types import Array
+from backend.stability.masses import mass_model
+from backend.stability.polygon import support_polygon
+from backend.stability.zmp import edge_moments
 from backend.tracking import tracker
 from backend.tracking.association import associate
 from backend.tracking.records import Detections
@@ -95,6 +98,7 @@ def compile_kernels() -> None:
     empty = Watched()
     cloud = Cloud("own", "lidar", 0.0, _GROUND, np.eye(4), near)
     watch(watch(empty, (cloud,))[0], (cloud,))
+    edge_moments(mass_model(machine), support_polygon(machine), q, q, q)
     layers = {"partner": near}
     joint4(machine, layers, (3, 3, 3, 3))
     free = certified4(machine, layers, 0.1, (3, 3, 3, 3)).certified_free()

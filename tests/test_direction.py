@@ -30,9 +30,10 @@ ROOMS: dict[str, set[str]] = {
         "backend.fusion",
     },
     "backend.safety": {"backend.collision", "backend.machine", "backend.spatial"},
+    "backend.stability": {"backend.machine", "backend.spatial", "backend.errors"},
     "backend.planning": {
         *("backend.safety", "backend.collision", "backend.machine", "backend.spatial"),
-        "backend.errors",
+        *("backend.stability", "backend.errors"),
     },
     "backend.perception": {"backend.spatial", "backend.errors"},
     "backend.tracking": {"backend.spatial", "backend.errors"},
@@ -41,10 +42,11 @@ ROOMS: dict[str, set[str]] = {
     },
     "backend.pipeline": {
         *("backend.safety", "backend.cspace", "backend.collision", "backend.fusion"),
-        *("backend.perception", "backend.tracking"),
+        *("backend.perception", "backend.tracking", "backend.stability"),
         *("backend.site", "backend.machine", "backend.spatial", "backend.errors"),
     },
     "backend.documents": {
+        "backend.stability",
         *("backend.pipeline", "backend.safety", "backend.cspace", "backend.collision"),
         *("backend.gauge", "backend.site", "backend.fusion", "backend.machine"),
         *("backend.perception", "backend.tracking", "backend.spatial", "backend.errors"),
@@ -53,7 +55,7 @@ ROOMS: dict[str, set[str]] = {
     "backend.warm": {
         *("backend.pipeline", "backend.planning", "backend.cspace", "backend.collision"),
         *("backend.machine", "backend.perception", "backend.safety", "backend.site"),
-        *("backend.spatial", "backend.tracking"),
+        *("backend.spatial", "backend.stability", "backend.tracking"),
     },
     "cockpit": {"backend", "cockpit"},
 }
@@ -82,7 +84,7 @@ LIBRARIES: dict[str, str | tuple[str, ...]] = {
 IMPURE = {"time", "random", "threading", "logging", "asyncio", "socket", "subprocess", "requests"}
 PURE = {
     *("spatial", "collision", "control", "cspace", "fusion", "gauge", "safety", "planning"),
-    *("perception", "pipeline", "tracking"),
+    *("perception", "pipeline", "stability", "tracking"),
 }
 
 

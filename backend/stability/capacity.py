@@ -1,0 +1,105 @@
+"""Lift capacity: what a machine can hold before an edge of its support polygon bears no more.
+
+At rest every edge's moment is affine in the payload, so the payload at which it is used up follows
+from two of them. `least` is the share of the way from the polygon's centre to an edge that must be
+left (`zmp.share`): 0 is the tipping load itself. What the hydraulics can lift is not asked here.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from backend.machine.inverse import inverse
+from backend.machine.model import Machine
+from backend.spatial import transform
+from backend.spatial.types import Array
+from backend.stability.dynamics import down, wrench_of
+from backend.stability.masses import MassModel, mass_model
+from backend.stability.polygon import Polygon, shrunk
+from backend.stability.zmp import moments_of
+
+_PROBE = 1000.0  # payload whose moments are compared with those of none [kg]
+
+
+@dataclass(frozen=True)
+class CapacityChart:
+    """payload: (a, r) [kg] that may hang at the tip, NaN where it cannot be, inf where a load only
+    steadies; azimuths: (a,) of the tip in the root frame, counter-clockwise from its x [rad];
+    reaches: (r,) from the swing axis, ascending [m]; height: above the swing joint's origin [m].
+    """
+
+    azimuths: Array
+    reaches: Array
+    payload: Array
+    height: float
+
+
+def lift_capacity(
+    machine: Machine,
+    support: Polygon,
+    q: Array,
+    T_site_root: Array | None = None,
+    least: float = 0.0,
+    at: Array | None = None,
+) -> Array:
+    """(...) greatest payload at rest [kg]; 0 where even none is too much, inf where none is.
+
+    q: (..., n) [rad]; T_site_root: (..., 4, 4), level when None; at: as in `mass_model`. Raises
+    InputError when masses are not known or `least` is no share.
+    """
+    within = shrunk(support, least)
+    empty = _static(mass_model(machine, 0.0, at), within, q, T_site_root)
+    loaded = _static(mass_model(machine, _PROBE, at), within, q, T_site_root)
+    taken = (empty - loaded) / _PROBE
+    with np.errstate(divide="ignore", invalid="ignore"):
+        most = np.where(taken > 0.0, empty / taken, np.inf).min(axis=-1)
+    # An edge that does not hold the empty machine is not helped by what hangs elsewhere.
+    return np.asarray(np.where((empty < 0.0).any(axis=-1), 0.0, most))
+
+
+def capacity_chart(
+    machine: Machine,
+    support: Polygon,
+    azimuths: Array,
+    reaches: Array,
+    height: float,
+    attitude: float,
+    T_site_root: Array | None = None,
+    least: float = 0.0,
+) -> CapacityChart:
+    """The capacity with the tip at `height` and the bucket at `attitude` [rad], elbow up.
+
+    azimuths: (a,) [rad]; reaches: (r,) ascending [m]; T_site_root: (4, 4); as in `lift_capacity`.
+    """
+    angle, reach = np.meshgrid(azimuths, reaches, indexing="ij")
+    p_swing = np.stack(
+        [reach * np.cos(angle), reach * np.sin(angle), np.full_like(reach, height)], -1
+    )
+    found = inverse(machine, transform.apply(machine.arm.T_root_swing, p_swing), attitude)
+    can = found.reachable & found.within_limits
+    payload = lift_capacity(machine, support, found.q, T_site_root, least)
+    return CapacityChart(
+        np.asarray(azimuths, dtype=float),
+        np.asarray(reaches, dtype=float),
+        np.where(can, payload, np.nan),
+        float(height),
+    )
+
+
+def farthest(chart: CapacityChart, payload: float) -> Array:
+    """(a,) the greatest charted reach up to which `payload` [kg] may be held everywhere [m].
+
+    NaN in directions where it may be held nowhere.
+    """
+    known = ~np.isnan(chart.payload)
+    refused = known & (chart.payload < payload)
+    good = known & ~np.logical_or.accumulate(refused, axis=1)
+    reach = np.where(good, chart.reaches, -np.inf).max(axis=1)
+    return np.where(np.isfinite(reach), reach, np.nan)
+
+
+def _static(model: MassModel, support: Polygon, q: Array, T_site_root: Array | None) -> Array:
+    still = np.zeros(np.shape(q))
+    return moments_of(wrench_of(model, q, still, still, down(T_site_root)), support)
