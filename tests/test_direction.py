@@ -45,7 +45,13 @@ ROOMS: dict[str, set[str]] = {
         *("backend.site", "backend.machine", "backend.spatial", "backend.errors"),
     },
     "backend.documents": {
-        *("backend.pipeline", "backend.safety", "backend.cspace", "backend.collision"),
+        *(
+            "backend.pipeline",
+            "backend.planning",
+            "backend.safety",
+            "backend.cspace",
+            "backend.collision",
+        ),
         *("backend.gauge", "backend.site", "backend.fusion", "backend.machine"),
         *("backend.perception", "backend.tracking", "backend.spatial", "backend.errors"),
     },
