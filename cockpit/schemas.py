@@ -28,6 +28,7 @@ from backend.documents.session import DiffDocument, SeriesDocument, SessionDocum
 from backend.documents.stages import StagesDocument
 from backend.documents.state import StateDocument
 from backend.documents.use_case import UseCaseDocument
+from backend.documents.use_case_state import UseCaseStateDocument
 from backend.documents.zone import ZoneFrameHeader
 from backend.errors import InputError
 from backend.shell.app.models import HealthModel, SiteModel, SnapshotModel
@@ -43,6 +44,7 @@ SCHEMAS: dict[str, tuple[type[BaseModel], str]] = {
     "stages": (StagesDocument, "/api/stages: what detection makes of the newest scan"),
     "along": (AlongDocument, "what along --json prints"),
     "use-case": (UseCaseDocument, "what use-case --json prints"),
+    "use-case-state": (UseCaseStateDocument, "/api/use-case"),
     "gauge-choice": (GaugeChoiceFile, "what operators draw and switch, as it is kept"),
     "gauge-state": (GaugeStateDocument, "/api/gauge"),
     "convert": (ConversionDocument, "what convert --json prints"),

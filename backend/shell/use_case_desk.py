@@ -9,7 +9,7 @@ from __future__ import annotations
 import logging
 import multiprocessing
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -57,7 +57,7 @@ class UseCaseDesk:
     def __init__(
         self,
         offered: tuple[Offer, ...],
-        labels: dict[str, str],
+        labels: Mapping[str, str],
         told: Callable[[str, str, dict[str, Any]], None],
     ) -> None:
         self._offered = {offer.name: offer for offer in offered}
