@@ -17,7 +17,7 @@ from backend.machine.pose import pose_error, tool_pose
 from backend.planning import rail_site
 from backend.planning.proximity import OWN_BODY, Limits, Sight, near_points, posed
 from backend.planning.records import Method, Settings, Thresholds
-from backend.planning.simulate import STEP, Run, Tell, follow_path, run, untold
+from backend.planning.simulate import STEP, Run, Tell, clearances, follow_path, run, untold
 from backend.planning.vibration import Vibration, vibration
 from backend.spatial.types import Array, IntArray
 
@@ -33,6 +33,7 @@ EXTRA = 3.0
 
 _POLE_SECONDS = 12.0
 _LOOKED = 12.0  # [m] within which the deciding pair is looked for
+_SAME = 1e-6  # [m] between two ways to work out a distance
 _THERE = (0.03, 0.03)  # [m], [rad] from the end that count as arrived
 
 
@@ -145,11 +146,13 @@ def nearest(machine: Machine, limits: Limits, q: Array, own: bool) -> Nearest:
     """The closest pair of each posture, q (m, n): of moving bodies to the limits and, with `own`,
     of own bodies to each other. Raises InputError where nothing is within sight.
     """
-    sight = Sight.everywhere(machine, _LOOKED)
+    # First how near, which is quick, then what it is: only one pair is that near.
+    known = clearances(machine, limits, q, cap=_LOOKED) if own else np.full(len(q), _LOOKED)
     distance, points = np.empty(len(q)), np.empty((len(q), 2, 3))
     pair: IntArray = np.empty(len(q), dtype=np.int64)
     words: dict[str, int] = {}
     for i, posture in enumerate(q):
+        sight = Sight.everywhere(machine, min(max(known[i], 0.0) + _SAME, _LOOKED))
         near = near_points(machine, posed(machine, posture), limits, sight, own=own)
         if not len(near):
             raise InputError(f"use case: nothing is within {_LOOKED:g} m of posture {i}.")

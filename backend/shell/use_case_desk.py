@@ -30,6 +30,8 @@ from backend.shell.use_case_offers import Offer
 log = logging.getLogger(__name__)
 
 Question = tuple[str, str]
+NICENESS = 5
+"""Images go before it when processors are short."""
 NOT_HERE = (
     "no use case is offered here: neither of the scenes that they are of is this site's; allowed "
     "are the sites pole and ballast."
@@ -67,7 +69,7 @@ class UseCaseDesk:
         self._progress: Any = context.RawValue("d", 0.0)
         self._stop: Any = context.RawValue("b", 0)
         begin = partial(_begin, self._progress, self._stop)
-        self._aside: Aside[Question, Answer] = Aside(begin, "runs use cases", niceness=10)
+        self._aside: Aside[Question, Answer] = Aside(begin, "runs use cases", NICENESS)
         self._lock = threading.Lock()
         self._running: Question | None = None
         self._thread: threading.Thread | None = None
