@@ -30,4 +30,5 @@ def _as_played(run: UseCaseRun, desk: UseCaseDesk) -> Played:
     return Played(
         *(offer.machine, offer.T_site_root, WORDS[run.method], run.run.times, run.run.q),
         *(near.distance, near.pair, near.words, near.points),
+        *(run.tool[:, :3, 3], run.designed[:, :3, 3]),
     )

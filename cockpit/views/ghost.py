@@ -49,9 +49,15 @@ class GhostNodes:
     """Nodes of one machine's ghost in one browser; kept when hidden, so that it comes at once."""
 
     def __init__(
-        self, scene: viser.SceneApi, name: str, entry: SceneMachine, folder: str = "/whatif"
+        self,
+        scene: viser.SceneApi,
+        name: str,
+        entry: SceneMachine,
+        folder: str = "/whatif",
+        raised: float = RAISED,
     ) -> None:
         self._name = name
+        self._raised = np.array([0.0, 0.0, raised])
         self._model = entry.model
         root = f"{folder}/{name}"
         self._root = scene.add_frame(root, show_axes=False, visible=False)
@@ -151,7 +157,7 @@ class GhostNodes:
             frame.position = poses[k, :3, 3]
             self._poses[k] = poses[k]
         corners = kinematics.body_boxes(self._model, poses).corners()[self._arm].reshape(-1, 3)
-        above = corners[np.argmax(corners[:, 2])] + [0.0, 0.0, RAISED]
+        above = corners[np.argmax(corners[:, 2])] + self._raised
         if np.abs(above - self._label.position).max() > 5e-4:
             self._label.position = above
 

@@ -40,7 +40,7 @@ def documents() -> dict[str, UseCaseDocument]:
 
 
 class UseCaseFeed(ExactFeed):
-    """Answers /api/use-case: a run takes as long as three questions."""
+    """Answers /api/use-case: a run takes as long as two questions."""
 
     def __init__(
         self, browser: Browser, size: tuple[int, int], documents: dict[str, UseCaseDocument]
@@ -78,7 +78,7 @@ class UseCaseFeed(ExactFeed):
             self.running = None
         elif self.running is not None:
             name, share = self.running
-            self.running = (name, share + 0.4) if share < 0.8 else None
+            self.running = (name, share + 0.6) if share < 0.5 else None
             if self.running is None:
                 self.done.append(name)
         _answer(route, self.state())
@@ -180,6 +180,10 @@ def test_methods_are_compared_and_one_is_followed(
     feed.until(lambda: feed.told()["method"] == "constrained")
     assert feed.told()["at"] == 4.9
     feed.page.screenshot(path=artifacts / f"use-case-angles-{size[0]}x{size[1]}.png")
+    feed.page.click("#uc-third")
+    feed.until(lambda: feed.shown("uc-error")["kind"] == "attitude")
+    yaw = documents["constrained"].runs[0].tool[k][3]
+    assert feed.shown("uc-error")["at"]["tool"][0] == pytest.approx(57.2958 * yaw, abs=0.01)
     feed.page.keyboard.press("Escape")
     feed.until(lambda: not feed.page.is_visible("#use-cases"))
     assert feed.told()["name"] is None

@@ -40,7 +40,9 @@ def played() -> Played:
     points[:, 0, 0], points[:, 1, 0] = 1.0, 3.0
     pair = (times > 2.0).astype(np.int64)
     pairs = ("stick to pole", "boom to own tracks")
-    return Played("left", T, "potential field", times, q, 2.0 - 0.5 * times, pair, pairs, points)
+    tool = np.stack([times, 0.0 * times, 1.0 + 0.0 * times], axis=1)
+    rest = (2.0 - 0.5 * times, pair, pairs, points, tool, 2.0 * tool)
+    return Played("left", T, "potential field", times, q, *rest)
 
 
 @pytest.fixture
@@ -72,6 +74,13 @@ def test_it_stands_where_the_run_says_at_that_moment(
     assert tuple(line.colors[0, 0]) == palette.line(palette.TEXT)  # never a level's colour
     assert handle(server, f"{ROOT}/pair/words").text == "stick to pole 1.00 m"
     assert handle(server, f"{ROOT}/2/0").color == palette.GHOST
+    for name, times in (("path", 1.0), ("meant", 2.0)):
+        drawn = handle(server, f"{ROOT}/{name}").points
+        first = T[:3, :3] @ (times * np.array([0.0, 0.0, 1.0])) + T[:3, 3]
+        last = T[:3, :3] @ (times * np.array([4.5, 0.0, 1.0])) + T[:3, 3]
+        np.testing.assert_allclose(drawn[0, 0], first, atol=1e-5)
+        np.testing.assert_allclose(drawn[-1, 1], last, atol=1e-5)
+        np.testing.assert_array_equal(drawn[1:, 0], drawn[:-1, 1])
     update(window, 102.0)  # its end; it stays there
     assert handle(server, f"{ROOT}/pair/words").text == "boom to own tracks -0.45 m"
     assert handle(server, f"{ROOT}/2/0").color == palette.GHOST_HIT
@@ -94,7 +103,7 @@ def test_it_goes_when_nobody_asks_for_it(server: viser.ViserServer, window: Brow
     update(window, 10.0 + 0.9 * ASKED)
     assert handle(server, ROOT).visible
     update(window, 10.0 + 1.1 * ASKED)
-    for name in (ROOT, f"{ROOT}/pair/line", f"{ROOT}/pair/words"):
+    for name in (ROOT, *(f"{ROOT}/{end}" for end in ("pair/line", "pair/words", "path", "meant"))):
         assert not handle(server, name).visible
     window.show_use_case(Shown(played(), 0.0, 0.0, 20.0))
     update(window, 20.0)

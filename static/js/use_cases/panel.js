@@ -27,7 +27,7 @@ function cells(name) {
   const run = model.run(name), now = model.running();
   if (now?.method === name && now.name === model.chosen().name) return [`working it out, ${number(100 * now.progress, 0)} %`, "", "", ""];
   if (!run) return [model.queued(name) ? "waits" : "not run", "", "", ""];
-  return [run.arrived === null ? "never" : `${number(run.arrived, 1)} s`, metres(run.nearest.distance), `${number(run.mean_error, 2)} / ${number(run.max_error, 2)} m`, `${run.vibration.sign_changes}×`];
+  return [run.arrived === null ? "never" : `${number(run.arrived, 1)} s`, metres(run.nearest.distance), `${number(run.mean_error, 2)} / ${number(run.max_error, 2)} m`, String(run.vibration.sign_changes)];
 }
 
 function rows() {
@@ -114,7 +114,7 @@ export function update() {
   write($("uc-words"), words());
   mark($("uc-words"), "kind", model.trouble() && !model.busy() && model.trouble() !== "stopped" ? "error" : "");
   write($("uc-second"), kinds().second === "rates" ? "Angles" : "Rates");
-  write($("uc-third"), kinds().third === "error" ? "Position" : "Error");
+  write($("uc-third"), kinds().next[0].toUpperCase() + kinds().next.slice(1));
   for (const row of $("uc-rows").rows) {
     const one = row.dataset.row;
     row.querySelector("button").setAttribute("aria-pressed", String(one === method));

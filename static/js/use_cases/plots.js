@@ -19,11 +19,14 @@ const INKS = ["#D2C394", "#9FB9CC", "#BFB0CF", "#A9C4AC", "#CDAFA3", "#E6EAED"];
 const DASHES = [null, [8, 3], [3, 3], null, [8, 3], [3, 3]];
 const TOP = 2; // m of distance shown at most
 
+const THIRD = ["error", "position", "attitude"];
+const POSE = { position: [0, (v) => v, ["x along", "y left", "z up"], "m", 2], attitude: [3, deg, ["yaw", "pitch", "roll"], "°", 1] };
+
 let second = "rates", third = "error"; // what the lower two show
-export const kinds = () => ({ second, third });
+export const kinds = () => ({ second, third, next: THIRD[(THIRD.indexOf(third) + 1) % THIRD.length] });
 export function turn(which) {
   if (which === "second") second = second === "rates" ? "angles" : "rates";
-  else third = third === "error" ? "position" : "error";
+  else third = THIRD[(THIRD.indexOf(third) + 1) % THIRD.length];
 }
 
 const charts = {};
@@ -50,8 +53,8 @@ function points({ box, x, y }, times, values) {
 function plot(g, width, height, up, title, unit, lowest = false) {
   const { seconds } = model.document();
   const t = size("tick");
-  const marks = ticks(0, seconds, Math.max(2, width / (5 * t)), [1, 2, 5, 10]).map((v) => [v, `${number(v, 0)} s`]);
-  return frame(g, { left: 4, right: width - 4, height: lowest ? height : height + 1.2 * t }, { from: 0, to: seconds, marks }, up, title, unit, 2.6);
+  const marks = ticks(0, seconds, Math.max(2, width / (5 * t)), [1, 2, 5, 10]).map((v) => [v, lowest ? `${number(v, 0)} s` : ""]);
+  return frame(g, { left: 4, right: width - 4, height: lowest ? height : height + 0.8 * t }, { from: 0, to: seconds, marks }, up, title, unit, 2.6);
 }
 
 /** The moment that is shown, and the values there. */
@@ -103,10 +106,10 @@ function distance(g, width, height) {
     g.fillStyle = "rgba(255, 107, 94, 0.10)";
     g.fillRect(box.left, y(0), box.right - box.left, box.bottom - y(0));
   }
-  for (const [value, text, base] of [[doc.upper, `p_u ${number(doc.upper, 1)} m`, "alphabetic"], [doc.lower, `p_l ${number(doc.lower, 1)} m`, "top"]]) {
+  for (const [value, text, align] of [[doc.upper, `p_u ${number(doc.upper, 1)} m`, "right"], [doc.lower, `p_l ${number(doc.lower, 1)} m`, "left"]]) {
     const level = Math.round(y(value)) + 0.5;
     segment(g, box.left, level, box.right, level, C.edge, 1.5, [4, 4]);
-    label(g, text, box.right - 4, base === "top" ? level + 2 : level - 2, { align: "right", base, halo: true });
+    label(g, text, align === "right" ? box.right - 4 : box.left + 4, level - 2, { align, halo: true });
   }
   overlaid(g, chart, all, (run) => run.distance);
   const run = model.run();
@@ -148,25 +151,24 @@ function error(g, width, height) {
   return { state: told("error", all, run ? { error: run.error[k] } : null), age: 0, label: `Path error: ${all.map((one) => `${one.words} at most ${metres(one.run.max_error)}`).join(", ")}` };
 }
 
-/** Fig. 4.8: where the tool is, and where it was meant to be. */
-function position(g, width, height) {
+/** Fig. 4.8: where the tool is and how it lies, and how that was meant to be. */
+function pose(g, width, height) {
   const run = model.run();
-  if (!run) return empty(g, width, height, "position");
+  if (!run) return empty(g, width, height, third);
   clear(g, width, height);
-  const all = [...run.tool, ...run.designed].flatMap((row) => row.slice(0, 3));
-  const title = "tool, m · dashed: as meant";
-  const chart = (charts.error = plot(g, width, height, upward(Math.min(...all), Math.max(...all), height < 130 ? 3 : 6), title, "m", true));
-  const axes = ["x along", "y left", "z up"];
-  axes.forEach((_, a) => {
-    curve(g, chart, points(chart, run.times, run.designed.map((row) => row[a])), INKS[a], 1.5, [4, 4]);
-    curve(g, chart, points(chart, run.times, run.tool.map((row) => row[a])), INKS[a], 2);
-  });
+  const [first, shown, axes, unit] = POSE[third];
+  const series = (rows) => axes.map((_, a) => rows.map((row) => shown(row[first + a])));
+  const is = series(run.tool), meant = series(run.designed), all = [...is, ...meant].flat();
+  const title = `tool, ${unit} · dashed: as meant`;
+  const chart = (charts.error = plot(g, width, height, upward(Math.min(...all), Math.max(...all), height < 130 ? 3 : 6), title, unit, true));
+  meant.forEach((values, a) => curve(g, chart, points(chart, run.times, values), INKS[a], 1.5, [4, 4]));
+  is.forEach((values, a) => curve(g, chart, points(chart, run.times, values), INKS[a], 2));
   const k = model.instant(run);
-  now(g, chart, axes.map((_, a) => [run.tool[k][a], INKS[a]]));
+  now(g, chart, is.map((values, a) => [values[k], INKS[a]]));
   const t = size("tick");
   const left = chart.box.left + 0.58 * t * title.length;
   legend(g, left, 1 + 0.55 * t, chart.box.right - left, axes.map((text, a) => [swatches.line(INKS[a], null, 2), text]), 7);
-  return { state: told("position", [{ name: run.method }], { tool: run.tool[k].slice(0, 3) }), age: 0, label: "Position of the tool and as it was meant" };
+  return { state: told(third, [{ name: run.method }], { tool: is.map((values) => values[k]) }), age: 0, label: `The tool's ${third} and as it was meant` };
 }
 
 const probing = (kind, lines) => (px, py) => {
@@ -183,8 +185,8 @@ const probes = {
   joints: probing("joints", (k, doc) => doc.roles.map((role, j) => `${role} ${second === "rates" ? `${number(deg(model.run().rates[k(model.run())][j]), 1)} °/s` : `${number(deg(model.run().joints[k(model.run())][j]), 1)}°`}`)),
   error: probing("error", (k) => {
     if (third === "error") return perRun((run, i) => `${number(run.error[i], 2)} m off, ${number(deg(run.turn_error[i]), 1)}° turned`)(k);
-    const run = model.run(), i = k(run);
-    return [["is", run.tool[i]], ["meant", run.designed[i]]].map(([word, row]) => `${word} x ${number(row[0], 2)}, y ${number(row[1], 2)}, z ${number(row[2], 2)} m`);
+    const run = model.run(), i = k(run), [first, shown, axes, unit, decimals] = POSE[third];
+    return [["is", run.tool[i]], ["meant", run.designed[i]]].map(([word, row]) => `${word} ${axes.map((axis, n) => `${axis.split(" ")[0]} ${number(shown(row[first + n]), decimals)}`).join(", ")} ${unit}`);
   }),
 };
 
@@ -192,5 +194,5 @@ const probes = {
 export const surfaces = () => [
   surface($("uc-distance"), distance, probes.distance),
   surface($("uc-joints"), joints, probes.joints),
-  surface($("uc-error"), (...given) => (third === "error" ? error : position)(...given), probes.error),
+  surface($("uc-error"), (...given) => (third === "error" ? error : pose)(...given), probes.error),
 ];
