@@ -27,6 +27,8 @@ from backend.documents.recordings import RecordingsDocument, RecoverDocument
 from backend.documents.session import DiffDocument, SeriesDocument, SessionDocument
 from backend.documents.stages import StagesDocument
 from backend.documents.state import StateDocument
+from backend.documents.use_case import UseCaseDocument
+from backend.documents.use_case_state import UseCaseStateDocument
 from backend.documents.zone import ZoneFrameHeader
 from backend.errors import InputError
 from backend.shell.app.models import HealthModel, SiteModel, SnapshotModel
@@ -41,6 +43,8 @@ SCHEMAS: dict[str, tuple[type[BaseModel], str]] = {
     "detection": (DetectionDocument, "what detect --json prints"),
     "stages": (StagesDocument, "/api/stages: what detection makes of the newest scan"),
     "along": (AlongDocument, "what along --json prints"),
+    "use-case": (UseCaseDocument, "what use-case --json prints"),
+    "use-case-state": (UseCaseStateDocument, "/api/use-case"),
     "gauge-choice": (GaugeChoiceFile, "what operators draw and switch, as it is kept"),
     "gauge-state": (GaugeStateDocument, "/api/gauge"),
     "convert": (ConversionDocument, "what convert --json prints"),
