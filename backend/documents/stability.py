@@ -9,8 +9,14 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import BaseModel, Field
 
-from backend.stability.polygon import polygon
-from backend.stability.state import Stability
+from backend.documents.state import MachineStateDocument, velocity_vector
+from backend.fusion.pose import FusedPose
+from backend.machine.model import Machine
+from backend.pipeline.records import Body3D
+from backend.stability.capacity import lift_capacity
+from backend.stability.masses import why_unknown
+from backend.stability.polygon import polygon, support_polygon
+from backend.stability.state import Stability, stability
 
 Number = Annotated[float | None, Field(description="null when not known")]
 
@@ -34,6 +40,36 @@ class StabilityModel(BaseModel):
     edges: list[str] | None = Field(description="names of its edges, from each corner to the next")
     critical_lift: Number = Field(description="a_cz of two masses [m/s^2]; null without a limit")
     critical_swing: Number = Field(description="Omega_c of two masses [rad/s]; null without one")
+
+
+class AssessedStability(StabilityModel):
+    """The same of a state document, whose motion is exact: sigma is 0."""
+
+    lift_capacity: Number = Field(
+        None,
+        description="at rest, until an edge bears no more [kg]; null without a limit",
+    )
+
+
+def assessed_stability(
+    machine: Machine,
+    document: MachineStateDocument,
+    pose: FusedPose,
+    body: Body3D,
+    where: str,
+) -> dict[str, Any]:
+    """Of one machine of a state document. Raises InputError naming `where`."""
+    accelerations = velocity_vector(
+        machine, document.joint_accelerations, f"{where}.joint_accelerations"
+    )
+    why = why_unknown(machine)
+    if why:
+        return stability_document(Stability(why)) | {"lift_capacity": math.nan}
+    exact, T = np.zeros(len(machine.joints)), body.link_poses[0]
+    motion = pose.joints, pose.joint_velocities, accelerations
+    found = stability(machine, document.payload, *motion, (exact, exact), T)
+    capacity = lift_capacity(machine, support_polygon(machine), pose.joints, T)
+    return stability_document(found) | {"lift_capacity": float(capacity)}
 
 
 def stability_document(found: Stability) -> dict[str, Any]:
