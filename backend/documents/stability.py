@@ -40,6 +40,11 @@ class StabilityModel(BaseModel):
     edges: list[str] | None = Field(description="names of its edges, from each corner to the next")
     critical_lift: Number = Field(description="a_cz of two masses [m/s^2]; null without a limit")
     critical_swing: Number = Field(description="Omega_c of two masses [rad/s]; null without one")
+    holds: list[Number] = Field(
+        default_factory=list,
+        description="how far from the swing axis the payload may be held, by direction in the root"
+        " frame evenly from -pi; null where nowhere [m]",
+    )
 
 
 class AssessedStability(StabilityModel):
@@ -88,6 +93,7 @@ def stability_document(found: Stability) -> dict[str, Any]:
         "edges": None if support is None else list(support.names),
         "critical_lift": found.critical_lift,
         "critical_swing": found.critical_swing,
+        "holds": np.round(found.holds, 3).tolist(),
     }
 
 
@@ -107,6 +113,7 @@ def read_stability(one: Mapping[str, Any]) -> Stability:
         edge=str(one["edge"]),
         critical_lift=_number(one["critical_lift"], math.inf),
         critical_swing=_number(one["critical_swing"], math.inf),
+        holds=np.array([_number(reach) for reach in one.get("holds", ())]),
     )
 
 

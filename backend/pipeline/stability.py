@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -27,12 +27,16 @@ from backend.safety.tip_over import TipOver
 from backend.spatial.identity import ByIdentity
 from backend.spatial.types import Array
 from backend.stability.allowance import allowed_fractions, travel_fraction
+from backend.stability.capacity import holding_reach
 from backend.stability.masses import why_unknown
 from backend.stability.polygon import shrunk
 from backend.stability.state import Stability, models, stability
 
 WINDOW = 0.2
 """Of the joint rates whose slope is the acceleration [s]."""
+CURVE_PERIOD = 1.0
+"""Between two curves of how far out a payload may be held [s]."""
+_NO_CURVE: Array = np.zeros(0)
 ADVISED = 0.5
 """Below this share what may be done is told to those, too, who only look."""
 _SAMPLES = 10  # of the joints in the window of a rate, for its noise
@@ -48,14 +52,29 @@ class Rates:
 
 @dataclass(frozen=True)
 class Standing:
-    """What a cycle hands to the next: the recent rates by machine."""
+    """What a cycle hands to the next: by machine the recent rates, and how far out it may hold its
+    payload, which is worked out anew every `CURVE_PERIOD`, for one machine a cycle: `holds` with
+    the times of that.
+    """
 
     recent: Mapping[str, Rates] = field(default_factory=dict)
+    holds: Mapping[str, tuple[float, Array]] = field(default_factory=dict)
 
 
-def following(before: Standing, machines: Mapping[str, MachineState]) -> Standing:
-    """With the rates of this cycle."""
-    return Standing({name: _with(before.recent.get(name), s.pose) for name, s in machines.items()})
+def following(
+    before: Standing, machines: Mapping[str, MachineState], now: float, config: Config
+) -> Standing:
+    """With the rates of this cycle, and a curve where one is due."""
+    recent = {name: _with(before.recent.get(name), s.pose) for name, s in machines.items()}
+    known = [name for name, state in machines.items() if not _why(state, name, config)]
+    holds = {name: one for name, one in before.holds.items() if name in known}
+    made = {name: holds.get(name, (-math.inf, _NO_CURVE))[0] for name in known}
+    due = [name for name, at in made.items() if now - at >= CURVE_PERIOD]
+    rules = config.stability
+    if due and rules is not None:
+        name = min(due, key=lambda one: made[one])
+        holds[name] = now, _curve(config.machines[name], machines[name], name, config, rules)
+    return Standing(recent, holds)
 
 
 def standing(
@@ -65,10 +84,7 @@ def standing(
     rules = config.stability
     if rules is None:
         return {}
-    return {
-        name: _of(config.machines[name], state, memory.recent[name], _payload(name, config, rules))
-        for name, state in machines.items()
-    }
+    return {name: _of(name, state, memory, config, rules) for name, state in machines.items()}
 
 
 def concerns(
@@ -107,16 +123,35 @@ def _payload(name: str, config: Config, rules: TipOver) -> float:
     return rules.payload.get(name, config.machines[name].payload)
 
 
-def _of(machine: Machine, state: MachineState, recent: Rates, payload: float) -> Stability:
+def _why(state: MachineState, name: str, config: Config) -> str:
+    """Why nothing is known of a machine, else empty."""
     pose = state.pose
-    why = why_unknown(machine)
+    why = why_unknown(config.machines[name])
     if not why and (pose.validity is not Validity.VALID or state.body is None):
         why = pose.reasons[0] if pose.reasons else "the pose is unknown"
     if not why and not _slope_known(pose):
         why = "the slope is not measured"
+    return why
+
+
+def _curve(
+    machine: Machine, state: MachineState, name: str, config: Config, rules: TipOver
+) -> Array:
+    assert state.body is not None
+    payload = _payload(name, config, rules)
+    _, support = models(ByIdentity(machine), payload)
+    T = state.body.link_poses[0]
+    return holding_reach(machine, support, state.pose.joints, payload, T, rules.keep)
+
+
+def _of(
+    name: str, state: MachineState, memory: Standing, config: Config, rules: TipOver
+) -> Stability:
+    why = _why(state, name, config)
     if why:
         return Stability(why)
     assert state.body is not None
+    machine, pose, recent = config.machines[name], state.pose, memory.recent[name]
     # A line through the joint's samples in its window: sigma sqrt(12 / n) / window.
     noise = pose.joint_sigmas * math.sqrt(12.0 / _SAMPLES) / JOINT_WINDOW
     rates, accelerations, spread = pose.joint_velocities, np.zeros(len(machine.joints)), 0.0 * noise
@@ -131,15 +166,16 @@ def _of(machine: Machine, state: MachineState, recent: Rates, payload: float) ->
         most = 2.0 * machine.max_acceleration
         accelerations = np.clip(accelerations, -most, most)
         spread = np.minimum(spread, machine.max_acceleration / math.sqrt(3.0))
-    return stability(
+    found = stability(
         machine,
-        payload,
+        _payload(name, config, rules),
         pose.joints,
         rates,
         accelerations,
         (noise, spread),
         state.body.link_poses[0],
     )
+    return replace(found, holds=memory.holds.get(name, (0.0, _NO_CURVE))[1])
 
 
 def _slope_known(pose: FusedPose) -> bool:

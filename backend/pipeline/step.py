@@ -109,7 +109,9 @@ def step(state: State, inputs: Inputs, now: float, config: Config) -> tuple[Stat
             driven_here = name in driven
             concerns += (site_concern(name, machines[name], now, config, driven_here, around),)
     concerns += somebody
-    stood = state.standing if config.stability is None else standing_after(state.standing, machines)
+    stood = state.standing
+    if config.stability is not None:
+        stood = standing_after(state.standing, machines, now, config)
     stability = standing(stood, machines, config)
     concerns += tip_overs(stability, machines, driven, now, config)
     concerns += tuple(unknown_ages(driven, machines, now, config))

@@ -28,7 +28,8 @@ class Stability:
     outside [m]; sigma: of it, from the rates' and accelerations' noise [m]; share: of the way from
     the middle to an edge that is left, 1 in the middle, 0 on an edge; edge: that it would tip over,
     in words; critical_lift, critical_swing: of Yamashita's two masses, the lesser of both axes, on
-    level ground [m/s^2, rad/s].
+    level ground [m/s^2, rad/s]; holds: by direction, from `capacity.holding_reach` [m], empty where
+    that was not asked.
     """
 
     reason: str
@@ -41,6 +42,7 @@ class Stability:
     edge: str = ""
     critical_lift: float = math.nan
     critical_swing: float = math.nan
+    holds: Array = field(default_factory=lambda: np.zeros(0))
 
 
 @lru_cache(maxsize=32)

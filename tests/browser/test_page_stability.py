@@ -31,6 +31,7 @@ def stability(**changes: Any) -> dict[str, Any]:
         "edges": ["front", "left", "rear", "right"],
         "critical_lift": None,
         "critical_swing": 2.1,
+        "holds": [None, *np.linspace(2.0, 4.0, 35).round(3).tolist()],
         **changes,
     }
 
@@ -71,6 +72,7 @@ def test_the_meter_says_how_firmly_the_own_machine_stands(feed: ExactFeed) -> No
     feed.send(lambda: bool(shown(feed)), stability=firm)
     assert shown(feed)["percent"] == 62
     assert shown(feed)["level"] == "CLEAR"
+    assert shown(feed)["holds"] == 35
     assert "62 %" in shown(feed)["words"]
     feed.send(lambda: "LEFT stands · margin 62 %" in label(feed), stability=firm)
     assert (np.abs(picture(feed) - TIP_OVER).max(axis=2) < 12).sum() > green + 100

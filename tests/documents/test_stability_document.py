@@ -67,6 +67,7 @@ def test_without_trusted_masses_it_says_so_and_nothing_else():
     found = assessed(dataclasses.replace(MINI, masses_trusted=False))
     assert "not trusted" in found.pop("reason")
     assert found.pop("edge") == ""
+    assert found.pop("holds") == []
     assert set(found.values()) == {None}
 
 

@@ -12,7 +12,9 @@ import pytest
 from backend.documents.snapshot import snapshot_document
 from backend.fusion.samples import AttitudeSample, Fix, FixSample, HeadingSample, JointSample
 from backend.machine import kinematics
+from backend.machine.inverse import inverse
 from backend.machine.load import load_machine
+from backend.machine.sun_map import sun_angles
 from backend.pipeline.config import Config
 from backend.pipeline.records import Inputs, Snapshot
 from backend.pipeline.step import initial, step
@@ -125,6 +127,28 @@ def test_the_rates_of_a_swing_and_its_acceleration_count(config):
     np.testing.assert_allclose(found.zmp, wanted, atol=0.06)
 
 
+def test_the_curve_is_where_the_payload_leaves_what_must_be_kept(config):
+    """In every direction the machine put there has that share left, or its arm ends there."""
+    machine, support = config.machines["a"], support_polygon(config.machines["a"])
+    heavy = dataclasses.replace(config, stability=TipOver(payload={"a": 2000.0}))
+    holds = run(heavy, STRETCHED).stability["a"].holds
+    assert holds.shape == (36,)
+    height = kinematics.end_point(machine, STRETCHED)[2]
+    shares = []
+    for k in np.flatnonzero(np.isfinite(holds)):
+        angle = -np.pi + k * np.pi / 18
+        tip = np.array([holds[k] * math.cos(angle), holds[k] * math.sin(angle), height])
+        attitude = float(sun_angles(machine, STRETCHED).sum())
+        q = inverse(machine, tip, attitude).q
+        shares.append(share(zmp(mass_model(machine, 2000.0), q, STILL, STILL), support))
+    assert len(shares) == 36
+    ends = holds > holds.max() - 0.01
+    np.testing.assert_allclose(np.array(shares)[~ends], 0.1, atol=0.02)
+    assert (np.array(shares)[ends] > 0.08).all()
+    assert 5 < ends.sum() < 31
+    assert holds[18] > holds[27] + 0.5  # farther ahead than to the left
+
+
 def test_a_firm_machine_is_clear_and_free(config):
     concern = tip_over(run(config, FOLDED, driven=("a",)))
     assert concern.level is Level.CLEAR
@@ -207,7 +231,9 @@ def test_the_document_fits_its_schema_and_reads_back(config, payload):
     SnapshotModel.model_validate(document)
     again = recorded_snapshot(document, heavy).stability["a"]
     for name, value in dataclasses.asdict(snapshot.stability["a"]).items():
-        if name != "support":
+        if name == "holds":
+            np.testing.assert_allclose(again.holds, value, atol=6e-4)
+        elif name != "support":
             np.testing.assert_array_equal(getattr(again, name), value, err_msg=name)
     assert again.support.names == snapshot.stability["a"].support.names
     assert 0.0 <= document["stability"]["a"]["percent"] <= 100.0

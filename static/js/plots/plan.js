@@ -17,7 +17,7 @@ import { inForce } from "../gauge/model.js";
 import { insideWords } from "../people/model.js";
 import { areaKey, drawAreas, hasAreas, tellAreas } from "./plan_areas.js";
 import { drawPeople, peopleLines, personSwatch } from "./plan_people.js";
-import { drawStability, stabilityWords } from "./plan_stability.js";
+import { drawStability, stabilityKey, stabilityWords } from "./plan_stability.js";
 import { distanceText, drawZones, outlineSun, view as zoneView, zoneExit, zoneLegend, zoneLines, zoneNote } from "./plan_zone.js";
 import { around, aroundLegend, aroundLines, drawAround, freeExit, nearestNote, nearestText, view as aroundView } from "./plan_around.js";
 
@@ -116,6 +116,7 @@ function paint(g, width, height, dpr) {
     ...(exact ? stale ? [[zoneLegend(g, dpr, stale, { as_is: 1 })[0][0], staleZone], ...whose] : [...(first ? [first] : []), ...whose, ...others]
       : [[swatches.area(hatch(g, stale ? C.stale : C.partner, dpr), stale ? C.stale : C.partner), stale ? staleZone : "zone for ✚ (Sun)"], ...whose]),
     ...(rows > 1 ? [] : [[swatches.line(C.text), "reach now"], [swatches.line(C.text, [4, 3], 1.5), "max"]]),
+    ...stabilityKey(),
     ...(seen?.tracks.length ? [[swatches.glyph(personSwatch), "person"]] : []),
   ]);
   return {

@@ -2,10 +2,11 @@
 
 import { C, LEVEL_COLOUR, hatch, size } from "../theme.js";
 import { number } from "../axis.js";
-import { fit } from "../pen.js";
+import { fit, swatches } from "../pen.js";
 import { label as nameOf, machine, names, silence, state } from "../state.js";
 import { chart } from "./plan_layers.js";
 
+const HOLDS = [2, 3]; // dashes
 const MARK = { SLOW: "▲ ", STOP: "■ ", UNKNOWN: "? " };
 
 /** What is known of a machine: null where nothing is judged, else with level and a reason when unknown. */
@@ -57,6 +58,33 @@ function drawOne(g, name, found) {
   g.stroke();
 }
 
+/** How far out the payload may be held, by direction; a gap where nowhere. */
+function drawHolds(g, name, found) {
+  const m = machine(name), holds = found.holds ?? [];
+  if (!m?.swing_center || !Number.isFinite(m.yaw) || !holds.some(Number.isFinite)) return 0;
+  g.beginPath();
+  let pen = false;
+  for (let i = 0; i <= holds.length; i++) {
+    const r = holds[i % holds.length], angle = m.yaw - Math.PI + (2 * Math.PI * i) / holds.length;
+    const known = Number.isFinite(r) && r !== null;
+    if (known) g[pen ? "lineTo" : "moveTo"](...chart.at([m.swing_center[0] + r * Math.cos(angle), m.swing_center[1] + r * Math.sin(angle)]));
+    pen = known;
+  }
+  g.setLineDash(HOLDS);
+  g.lineWidth = 2;
+  g.strokeStyle = C.tipOver;
+  g.stroke();
+  g.setLineDash([]);
+  return holds.filter(Number.isFinite).length;
+}
+
+/** Of the legend, where the curve is drawn. */
+export function stabilityKey() {
+  const own = standing(state.own);
+  if (!own || own.reason || !own.holds?.length) return [];
+  return [[swatches.line(C.tipOver, HOLDS, 2), `holds ${number(own.payload, 0)} kg`]];
+}
+
 /** In the upper left corner, below the coordinates: the bar is as full as the margin, in horizontal hatch. */
 function meter(g, found, dpr) {
   const t = size("tick"), { box } = chart;
@@ -86,8 +114,9 @@ export function drawStability(g, dpr) {
   }
   const own = standing(state.own);
   if (!own) return null;
+  const holds = own.reason ? 0 : drawHolds(g, state.own, own);
   const words = meter(g, own, dpr);
-  return { level: own.level, percent: own.percent === null ? null : Math.floor(own.percent), edge: own.edge ?? "", words };
+  return { holds, level: own.level, percent: own.percent === null ? null : Math.floor(own.percent), edge: own.edge ?? "", words };
 }
 
 /** For who hears the page, and for the pointer. */
