@@ -21,6 +21,7 @@ from backend.pipeline.records import Snapshot
 from backend.safety.partner import Limits
 from backend.safety.people import Watch
 from backend.safety.swing_risk import Boundaries
+from backend.safety.tip_over import TipOver
 from backend.shell.hub import Hub
 from backend.shell.image_loops import ImageLoop, ImageMaker
 from backend.shell.image_worker import ImageWorker
@@ -94,7 +95,14 @@ def make_config(site: Site, models: dict[str, Machine], own: tuple[str, ...], mo
         mode=mode,
         site=site_bodies(site),
         people=None if site.watch is None else _watch(site.watch),
+        stability=_tip_over(site),
     )
+
+
+def _tip_over(site: Site) -> TipOver:
+    table = site.stability
+    carried = {m.name: m.payload for m in site.machines if m.payload is not None}
+    return TipOver(table.keep, table.slow, carried, table.limits, table.required)
 
 
 def _watch(table: People) -> Watch:

@@ -25,6 +25,7 @@ from backend.documents.gauge_choice import GaugeChoiceFile, GaugeStateDocument
 from backend.documents.people import PeopleModel
 from backend.documents.recordings import RecordingsDocument, RecoverDocument
 from backend.documents.session import DiffDocument, SeriesDocument, SessionDocument
+from backend.documents.stability import StabilityModel
 from backend.documents.stages import StagesDocument
 from backend.documents.state import StateDocument
 from backend.documents.use_case import UseCaseDocument
@@ -55,6 +56,7 @@ SCHEMAS: dict[str, tuple[type[BaseModel], str]] = {
     "recording": (RecordingModel, "/api/recording"),
     "snapshot": (SnapshotModel, "/api/snapshot and the Zenoh key cockpit/snapshot"),
     "people": (PeopleModel, "the key people of a snapshot"),
+    "stability": (StabilityModel, "each machine under the key stability of a snapshot"),
     "zone": (ZoneFrameHeader, "the header of a driving zone's frame on the websocket"),
     "site": (SiteModel, "/api/site"),
     "health": (HealthModel, "/api/health"),
