@@ -135,8 +135,15 @@ def holding_reach(
     azimuths = -np.pi + 2.0 * np.pi / DIRECTIONS * np.arange(DIRECTIONS)
     reaches = np.linspace(0.0, machine.max_reach, _REACHES)
     chart = capacity_chart(
-        *(machine, support, azimuths, reaches, float(height), float(theta.sum())),
-        *(T_site_root, least, 1 if np.sin(theta[1]) <= 0.0 else -1),
+        machine,
+        support,
+        azimuths,
+        reaches,
+        float(height),
+        float(theta.sum()),
+        T_site_root,
+        least,
+        elbow=1 if np.sin(theta[1]) <= 0.0 else -1,
     )
     return farthest(chart, payload)
 
