@@ -132,11 +132,18 @@ def holding_reach(
     theta = sun_angles(machine, np.asarray(q, dtype=float))
     p_root = end_point(machine, np.asarray(q, dtype=float))[None]
     height = transform.apply(transform.inverse(machine.arm.T_root_swing), p_root)[0, 2]
-    azimuths = -np.pi + 2.0 * np.pi / DIRECTIONS * np.arange(DIRECTIONS)
+    azimuths = np.linspace(-np.pi, np.pi, DIRECTIONS, endpoint=False)
     reaches = np.linspace(0.0, machine.max_reach, _REACHES)
     chart = capacity_chart(
-        *(machine, support, azimuths, reaches, float(height), float(theta.sum())),
-        *(T_site_root, least, 1 if np.sin(theta[1]) <= 0.0 else -1),
+        machine,
+        support,
+        np.asarray(azimuths, dtype=float),
+        np.asarray(reaches, dtype=float),
+        float(height),
+        float(theta.sum()),
+        T_site_root,
+        least,
+        elbow=1 if np.sin(theta[1]) <= 0.0 else -1,
     )
     return farthest(chart, payload)
 
