@@ -26,7 +26,7 @@ format: install-dev
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 
-install: .venv/.installed
+install: .venv/.warm
 install-dev: .venv/.installed-dev
 
 .venv/bin/python:
@@ -37,10 +37,14 @@ install-dev: .venv/.installed-dev
 .venv/.installed: .venv/bin/python requirements.lock pyproject.toml
 	$(BIN)/python -m pip install --disable-pip-version-check --require-hashes -r requirements.lock
 	$(BIN)/python -m pip install --disable-pip-version-check --no-deps --no-build-isolation -e .
+	@touch $@
+
+# Compiled anew whenever a kernel's text is newer: numba would not see it in what calls the kernel.
+.venv/.warm: .venv/.installed $(shell grep -rl --include='*.py' 'from numba' backend) backend/warm.py
 	$(BIN)/python -m backend.warm
 	@touch $@
 
-.venv/.installed-dev: .venv/.installed requirements-dev.lock
+.venv/.installed-dev: .venv/.warm requirements-dev.lock
 	$(BIN)/python -m pip install --disable-pip-version-check --require-hashes -r requirements-dev.lock
 	@touch $@
 

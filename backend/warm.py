@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 from rich.progress import track
@@ -48,6 +50,26 @@ from backend.stability.zmp import edge_moments
 from backend.tracking import tracker
 from backend.tracking.association import associate
 from backend.tracking.records import Detections
+
+
+def forget_stale(folder: Path) -> bool:
+    """Remove what was compiled from other texts than the kernels below `folder` have now.
+
+    A compiled kernel holds the kernels of other files that it calls, but numba compiles it anew
+    only when its own file changes. Returns whether anything was removed.
+    """
+    texts = sorted(p for p in folder.rglob("*.py") if b"from numba" in p.read_bytes())
+    digest = hashlib.sha256()
+    for path in texts:
+        digest.update(str(path.relative_to(folder)).encode() + b"\0" + path.read_bytes())
+    stamp = folder / "__pycache__" / "kernels.sha256"
+    if stamp.exists() and stamp.read_text() == digest.hexdigest():
+        return False
+    for compiled in (*folder.rglob("*.nbi"), *folder.rglob("*.nbc")):
+        compiled.unlink(missing_ok=True)
+    stamp.parent.mkdir(exist_ok=True)
+    stamp.write_text(digest.hexdigest())
+    return True
 
 
 def compile_kernels() -> None:
@@ -132,6 +154,7 @@ def _straight(s: Array) -> Array:
 
 
 def main() -> None:
+    forget_stale(Path(__file__).parent)
     steps: list[tuple[str, Callable[[], object]]] = [("kernels", compile_kernels)]
     steps += [(name, partial(load_machine, name)) for name in shipped_machines()]
     for _, prepare in track(steps, "Preparing", transient=True):

@@ -21,6 +21,7 @@ from backend.pipeline.records import Snapshot
 from backend.safety.partner import Limits
 from backend.safety.people import Watch
 from backend.safety.swing_risk import Boundaries
+from backend.safety.tip_over import TipOver
 from backend.shell.hub import Hub
 from backend.shell.image_loops import ImageLoop, ImageMaker
 from backend.shell.image_worker import ImageWorker
@@ -33,6 +34,7 @@ from backend.spatial.types import Array
 
 if TYPE_CHECKING:
     from cockpit.views.server import View
+    from cockpit.views.use_case_nodes import Played
 
 MAX_HEIGHT = 50.0  # of a picked bucket tip above or below the swing joint [m]
 _LOOPS = (("images", (SUN, EXACT), "image_hz"), ("zones", (ZONE, REGIONS), "zone_hz"))
@@ -93,7 +95,14 @@ def make_config(site: Site, models: dict[str, Machine], own: tuple[str, ...], mo
         mode=mode,
         site=site_bodies(site),
         people=None if site.watch is None else _watch(site.watch),
+        stability=_tip_over(site),
     )
+
+
+def _tip_over(site: Site) -> TipOver:
+    table = site.stability
+    carried = {m.name: m.payload for m in site.machines if m.payload is not None}
+    return TipOver(table.keep, table.slow, carried, table.limits, table.required)
 
 
 def _watch(table: People) -> Watch:
@@ -164,7 +173,8 @@ class Desk:
     """Answers pages: what-if, ghosts, cameras, heights of reach images, strips along tracks.
 
     view: the 3D scene's, None while it starts; action: told what an operator did, on which
-    page, with what details; ready: whether what judges postures is loaded.
+    page, with what details; ready: whether what judges postures is loaded; played: a run by the
+    names of use case and method, None where there is none.
     """
 
     def __init__(
@@ -174,12 +184,14 @@ class Desk:
         view: Callable[[], View | None],
         action: Callable[[str, str | None, dict[str, Any]], None] = lambda *_: None,
         ready: Callable[[], bool] = lambda: True,
+        played: Callable[[str, str], Played | None] = lambda *_: None,
     ) -> None:
         self._config = config
         self._hub = hub
         self._view = view
         self._action = action
         self._ready = ready
+        self._played = played
         self._tip_heights: dict[str, float] = {}
         self.recent = Recent()
 
@@ -222,6 +234,10 @@ class Desk:
             if view is not None and isinstance(shown, list) and all(map(_is_text, shown)):
                 with contextlib.suppress(ValueError):
                     view.set_stages(shown, page)
+            return
+        if kind == "use_case":  # likewise
+            if view is not None:
+                self._show_use_case(view, message, page)
             return
         if isinstance(kind, str):
             self._action(kind, page, message)
@@ -268,6 +284,15 @@ class Desk:
             q = self._posture(machine, joints, snapshot)
             touched = touches(snapshot, self._config, machine, q)
         view.set_ghost(machine, joints, page, touched)
+
+    def _show_use_case(self, view: View, message: dict[str, Any], page: str | None) -> None:
+        """A run of a use case from one of its moments on; none takes the ghost away."""
+        name, method = message.get("name"), message.get("method")
+        at, rate = message.get("at", 0.0), message.get("rate", 0.0)
+        run = self._played(name, method) if _is_text(name) and _is_text(method) else None
+        if all(isinstance(v, int | float) and math.isfinite(v) for v in (at, rate)):
+            with contextlib.suppress(ValueError):
+                view.set_use_case(run, float(at), float(rate), page)
 
     def _pick_height(self, own: str, height: Any) -> None:
         """The height of a machine's reach image, for all pages; None: as the tip is."""

@@ -11,10 +11,10 @@ from backend.control.person import SUPERVISOR, Person
 from backend.errors import InputError
 from backend.shell.access.access import LOCAL, Access
 from backend.shell.access.audit import Audit
-from backend.shell.access.certificates import Tls, fingerprint, given, self_signed
 from backend.shell.access.links import Links
 from backend.shell.access.places import state_folder
 from backend.shell.access.sessions import Sessions
+from backend.shell.access.tls import Tls, given
 from backend.shell.access.users import Users, default_file
 
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
@@ -97,6 +97,8 @@ class Entry:
                 "by everybody on the network between."
             )
         if self.tls is not None:
+            from backend.shell.access.certificates import fingerprint
+
             found.append(f"Certificate (SHA-256): {fingerprint(self.tls)}")
         return found
 
@@ -153,6 +155,9 @@ def _tls(options: EntryOptions, host: str) -> Tls | None:
         return given(options.cert, options.key)
     if not options.self_signed:
         return None
+    # Loaded only here: its libraries load slowly, and the page waits for what is loaded before.
+    from backend.shell.access.certificates import self_signed
+
     names = (*LOOPBACK, *((socket.gethostname(),) if host not in LOOPBACK else ()))
     return self_signed(state_folder(), (*names, *_addresses(host)))
 

@@ -26,8 +26,11 @@ from backend.documents.people import PeopleModel
 from backend.documents.plan_document import PlanDocument, PlanTaskDocument
 from backend.documents.recordings import RecordingsDocument, RecoverDocument
 from backend.documents.session import DiffDocument, SeriesDocument, SessionDocument
+from backend.documents.stability import StabilityModel
 from backend.documents.stages import StagesDocument
 from backend.documents.state import StateDocument
+from backend.documents.use_case import UseCaseDocument
+from backend.documents.use_case_state import UseCaseStateDocument
 from backend.documents.zone import ZoneFrameHeader
 from backend.errors import InputError
 from backend.shell.app.models import HealthModel, SiteModel, SnapshotModel
@@ -44,6 +47,8 @@ SCHEMAS: dict[str, tuple[type[BaseModel], str]] = {
     "plan-task": (PlanTaskDocument, "the task that plan reads"),
     "plan": (PlanDocument, "what plan --json prints"),
     "along": (AlongDocument, "what along --json prints"),
+    "use-case": (UseCaseDocument, "what use-case --json prints"),
+    "use-case-state": (UseCaseStateDocument, "/api/use-case"),
     "gauge-choice": (GaugeChoiceFile, "what operators draw and switch, as it is kept"),
     "gauge-state": (GaugeStateDocument, "/api/gauge"),
     "convert": (ConversionDocument, "what convert --json prints"),
@@ -54,6 +59,7 @@ SCHEMAS: dict[str, tuple[type[BaseModel], str]] = {
     "recording": (RecordingModel, "/api/recording"),
     "snapshot": (SnapshotModel, "/api/snapshot and the Zenoh key cockpit/snapshot"),
     "people": (PeopleModel, "the key people of a snapshot"),
+    "stability": (StabilityModel, "each machine under the key stability of a snapshot"),
     "zone": (ZoneFrameHeader, "the header of a driving zone's frame on the websocket"),
     "site": (SiteModel, "/api/site"),
     "health": (HealthModel, "/api/health"),

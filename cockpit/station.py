@@ -27,6 +27,7 @@ from backend.shell.app.gauge_api import gauge_router
 from backend.shell.app.metrics import metrics_router
 from backend.shell.app.server import WebServer, bind
 from backend.shell.app.stages import stages_router
+from backend.shell.app.use_case_api import use_case_router
 from backend.shell.app.viewer_proxy import Hooks, viewer_router
 from backend.shell.app.wire import dumps
 from backend.shell.gauge_desk import GaugeDesk
@@ -37,6 +38,8 @@ from backend.shell.link.session import open_session
 from backend.shell.link.source import LinkSource
 from backend.shell.runner import Runner
 from backend.shell.session.recorder import Recorder
+from backend.shell.use_case_desk import UseCaseDesk
+from backend.shell.use_case_offers import offers
 from backend.site.site import Site
 from cockpit.cameras import make_cameras, whep_origins
 from cockpit.desk import Desk, along_loops, image_loops, load_models, make_config, may_say
@@ -45,6 +48,7 @@ from cockpit.options import Options
 from cockpit.people import make_people
 from cockpit.recording import make_recorder, recording_sources, site_folder
 from cockpit.resolutions import resolutions
+from cockpit.use_case_scene import UseCaseScene
 from cockpit.views.client_head import HEAD
 from cockpit.views.inputs import scene_site
 from cockpit.views.server import View, start
@@ -101,7 +105,16 @@ class Station:
         recording = isinstance(self.recorder, Recorder)
         self.alarm_log = AlarmLog(kept if recording else None, self.config.labels)
         self._closing.callback(self.alarm_log.close)
-        self._desk = Desk(self.config, self.hub, lambda: self.view, self.recorder.action)
+        found = offers(site, self.config.site)
+        self.use_cases = UseCaseDesk(found, self.config.labels, self._event)
+        self._closing.callback(self.use_cases.close)
+        self._desk = Desk(
+            self.config,
+            self.hub,
+            lambda: self.view,
+            self.recorder.action,
+            played=UseCaseScene(self.use_cases).played,
+        )
         kept = state_folder() / "gauge" / f"{site.name}.json"
         self.gauge = GaugeDesk(self.config, self.hub, kept, self._event)
         self.receiver = Receiver(
@@ -161,6 +174,7 @@ class Station:
                 metrics_router(frames, self.backend, self._recorded, options.entry.metrics_token),
                 camera_router(make_cameras(site, session)),
                 gauge_router(self.gauge),
+                use_case_router(self.use_cases),
                 *(() if self.people is None else (stages_router(self.people.look),)),
             ),
             access=access,

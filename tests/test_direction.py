@@ -46,9 +46,8 @@ ROOMS: dict[str, set[str]] = {
         *("backend.site", "backend.machine", "backend.spatial", "backend.errors"),
     },
     "backend.documents": {
-        "backend.planning",
-        "backend.stability",
-        *("backend.pipeline", "backend.safety", "backend.cspace", "backend.collision"),
+        *("backend.pipeline", "backend.planning", "backend.safety", "backend.cspace"),
+        *("backend.collision", "backend.stability"),
         *("backend.gauge", "backend.site", "backend.fusion", "backend.machine"),
         *("backend.perception", "backend.tracking", "backend.spatial", "backend.errors"),
     },

@@ -9,6 +9,8 @@ from numba import njit
 from backend.collision.triangle_kernels import edge_edge
 from backend.spatial.types import Array
 
+_ROUNDINGS = 1e-14  # relative to the terms of a sum
+
 
 @njit(cache=True, nogil=True)
 def boxes_apart(
@@ -19,7 +21,8 @@ def boxes_apart(
     work: (11, 3), overwritten. For boxes that overlap the result has no meaning.
 
     Where the closest points p on a and q on b lie inside of two edges, q is outside of both faces
-    at a's edge: other edges are left out.
+    at a's edge: other edges are left out. No other points need be looked at once the planes through
+    p and q across q - p have the boxes on their far sides.
     """
     D, V = work[:3], work[3:11]
     t = np.empty(3)
@@ -59,6 +62,8 @@ def boxes_apart(
             for x in range(3):
                 pa[x] = ha[x] if i >> x & 1 else -ha[x]
                 pb[x] = t[x] + D[0, x] * local[0] + D[1, x] * local[1] + D[2, x] * local[2]
+    if _closest(pa, pb, best, t, D, ha, hb):
+        return _write(ca, Ra, pa, pb, best, out)
     both = np.empty((2, 3))
     e = np.empty(3)
     for k in range(3):
@@ -87,7 +92,35 @@ def boxes_apart(
                         best = square
                         for x in range(3):
                             pa[x], pb[x] = both[0, x], both[1, x]
+                        if _closest(pa, pb, best, t, D, ha, hb):
+                            return _write(ca, Ra, pa, pb, best, out)
+    return _write(ca, Ra, pa, pb, best, out)
+
+
+@njit(cache=True, nogil=True)
+def _closest(pa: Array, pb: Array, square: float, t: Array, D: Array, ha: Array, hb: Array) -> bool:
+    """Whether no points of the boxes are nearer to each other than pa and pb, (3,) in a's axes,
+    whose squared distance is given: seen along pb - pa, b begins where pb lies and a ends where pa
+    lies. t (3,), D (3, 3): middle and axes of b there. To a few roundings.
+    """
+    gap = size = 0.0
+    for x in range(3):
+        n = pb[x] - pa[x]
+        gap += n * t[x] - abs(n) * ha[x]
+        size += abs(n * t[x]) + abs(n) * ha[x]
+    for o in range(3):
+        along = 0.0
+        for x in range(3):
+            along += (pb[x] - pa[x]) * D[o, x]
+        gap -= abs(along) * hb[o]
+        size += abs(along) * hb[o]
+    return gap >= square - _ROUNDINGS * size
+
+
+@njit(cache=True, nogil=True)
+def _write(ca: Array, Ra: Array, pa: Array, pb: Array, square: float, out: Array) -> float:
+    """Writes the points (2, 3) in the frame that a stands in; returns their distance [m]."""
     for x in range(3):
         out[0, x] = ca[x] + Ra[x, 0] * pa[0] + Ra[x, 1] * pa[1] + Ra[x, 2] * pa[2]
         out[1, x] = ca[x] + Ra[x, 0] * pb[0] + Ra[x, 1] * pb[1] + Ra[x, 2] * pb[2]
-    return float(np.sqrt(best))
+    return float(np.sqrt(square))

@@ -13,6 +13,7 @@ from backend.cspace.sun_pose import sun_pose
 from backend.documents.driving import driving_document
 from backend.documents.margins import margins_document
 from backend.documents.scene import make_scene
+from backend.documents.stability import assessed_stability
 from backend.documents.state import (
     StateDocument,
 )
@@ -58,6 +59,12 @@ def assess(
             for own, partner in permutations(poses, 2)
         },
         "margins": {name: margins_document(scene, name, ground) for name in placed},
+        "stability": {
+            name: assessed_stability(
+                machines[name], state.machines[name], poses[name], placed[name], f"{where}: {name}"
+            )
+            for name in placed
+        },
         "driving_zone": driving_document(
             machines,
             {name: pose.joints for name, pose in poses.items()},

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pydantic import BaseModel, Field
 
 from backend.documents.driving import DrivingZoneDocument
+from backend.documents.stability import AssessedStability
 
 Point = tuple[float, float, float]
 Plane = tuple[float, float]
@@ -100,4 +101,5 @@ class AssessmentDocument(BaseModel):
     obstacles: list[ClosestDocument] = Field(description="one entry per obstacle and machine")
     sun: dict[str, SunDocument]
     margins: dict[str, dict[str, MarginDocument]] = Field(description="by machine and joint role")
+    stability: dict[str, AssessedStability] = Field(description="by machine")
     driving_zone: dict[str, DrivingZoneDocument]

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from backend.documents.people_document import people_document
+from backend.documents.stability import stability_document
 from backend.documents.working_area import working_area_document
 from backend.machine.model import Machine
 from backend.machine.outline import outlines_of
@@ -54,6 +55,9 @@ def snapshot_document(snapshot: Snapshot, config: Config) -> dict[str, Any]:
         "people": None
         if snapshot.people is None
         else people_document(snapshot.people, snapshot.time),
+        "stability": {
+            name: stability_document(found) for name, found in snapshot.stability.items()
+        },
         "images": {
             key: {
                 "state_time": stamp.state_time,

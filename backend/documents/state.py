@@ -44,6 +44,10 @@ class MachineStateDocument(Table):
     roll: Number = Field(0.0, ge=-1.5, le=1.5, description="about the forward axis [rad]")
     joints: dict[str, Number] = Field(description="the URDF's own joint values by role [rad]")
     joint_velocities: dict[str, Number] = Field(default_factory=dict, description="[rad/s]")
+    joint_accelerations: dict[str, Number] = Field(
+        default_factory=dict, description="for stability only [rad/s^2]"
+    )
+    payload: NotNegative = Field(0.0, description="at the end point, for stability only [kg]")
     sigma: Sigma = Field(default_factory=Sigma)
 
 

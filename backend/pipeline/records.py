@@ -15,6 +15,7 @@ from backend.safety.record import Concern
 from backend.site.gauge_choice import NO_CHOICE, GaugeChoice
 from backend.spatial.boxes import Boxes
 from backend.spatial.types import Array
+from backend.stability.state import Stability
 
 
 @dataclass(frozen=True)
@@ -189,3 +190,4 @@ class Snapshot:
     notices: tuple[Notice, ...] = ()
     gauge: GaugeInForce = AS_THE_SITE_SAYS
     people: People | None = None  # None on a site without LiDARs
+    stability: dict[str, Stability] = field(default_factory=dict)  # empty where it is not judged

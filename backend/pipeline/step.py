@@ -38,6 +38,9 @@ from backend.pipeline.records import (
     Snapshot,
 )
 from backend.pipeline.site_concern import site_concern
+from backend.pipeline.stability import Standing, standing
+from backend.pipeline.stability import concerns as tip_overs
+from backend.pipeline.stability import following as standing_after
 from backend.pipeline.working_area import area_of, inside
 from backend.pipeline.working_gauge import following as gauge_now
 from backend.pipeline.working_gauge import site_of
@@ -59,6 +62,7 @@ class State:
     notices: tuple[Notice, ...] = ()
     gauge: GaugeInForce = AS_THE_SITE_SAYS
     people: PeopleState = field(default_factory=PeopleState)
+    standing: Standing = field(default_factory=Standing)
     cycle: int = 0
 
 
@@ -105,6 +109,11 @@ def step(state: State, inputs: Inputs, now: float, config: Config) -> tuple[Stat
             driven_here = name in driven
             concerns += (site_concern(name, machines[name], now, config, driven_here, around),)
     concerns += somebody
+    stood = state.standing
+    if config.stability is not None:
+        stood = standing_after(state.standing, machines, now, config)
+    stability = standing(stood, machines, config)
+    concerns += tip_overs(stability, machines, driven, now, config)
     concerns += tuple(unknown_ages(driven, machines, now, config))
     raised = alarms.update(state.alarms, concerns, now)
     health = _health(state.health, inputs, strangers)
@@ -123,6 +132,7 @@ def step(state: State, inputs: Inputs, now: float, config: Config) -> tuple[Stat
         notices=notices,
         gauge=gauge,
         people=people,
+        stability=stability,
     )
     following = replace(
         state,
@@ -133,6 +143,7 @@ def step(state: State, inputs: Inputs, now: float, config: Config) -> tuple[Stat
         notices=notices,
         gauge=gauge,
         people=memory,
+        standing=stood,
         cycle=state.cycle + 1,
     )
     return following, snapshot

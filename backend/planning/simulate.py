@@ -29,6 +29,13 @@ _JUDGED = 1.0  # [m] beyond which a stop's clearance does not matter
 _FAR = 1e3  # [m] told where nothing is near
 
 
+Tell = Callable[[float], None]
+
+
+def untold(_: float) -> None:
+    """Nobody is told how far a run is."""
+
+
 class Run(NamedTuple):
     """m instants: times (m,) [s]; q (m, n) [rad]; rates (m, n) [rad/s], commanded at the instant;
     distance (m,) shortest to a limit or an own body [m]; scale (m,) see Action; error (m, 2) of the
@@ -55,15 +62,20 @@ def follow_path(
     settings: Settings,
     extra: float = 0.0,
     T_site_root: Array | None = None,
+    tell: Tell = untold,
 ) -> Run:
-    """The tool follows a path for its duration and `extra` seconds; None is without any limit."""
+    """The tool follows a path for its duration and `extra` seconds; None is without any limit.
+
+    tell: see `run`.
+    """
 
     def wish(t: float, q: Array) -> Wish:
         T = tool_pose(machine, posed(machine, q, T_site_root))
         return follow(path.goal(machine, t, T_site_root), T, _STIFFNESS, _MAKE_UP)
 
     seconds = path.duration + extra
-    done = run(method, machine, limits, path.postures[0], wish, settings, seconds, T_site_root)
+    q_start = path.postures[0]
+    done = run(method, machine, limits, q_start, wish, settings, seconds, T_site_root, tell=tell)
     error = np.array(
         [
             _parts(
@@ -91,11 +103,13 @@ def run(
     T_site_root: Array | None = None,
     guarded: bool = False,
     dt: float = STEP,
+    tell: Tell = untold,
 ) -> Run:
     """`wish(t, q)` acted upon every dt from rest at q_start (n,); None is without any limit.
 
     guarded: a stop must stay possible at every step (see `stopping.stoppable`); only with
-    settings.accelerations.
+    settings.accelerations. tell: called with the time of every step [s]; what it raises ends the
+    run.
     """
     n, count = len(machine.joints), round(seconds / dt)
     q, rates = np.array(q_start, dtype=float), np.zeros(n)
@@ -108,6 +122,7 @@ def run(
         return clearances(machine, limits, postures, T_site_root, cap=_JUDGED)
 
     for i in range(count):
+        tell(float(times[i]))
         asked = wish(float(times[i]), q)
         T = posed(machine, q, T_site_root)
         if method is None:

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
+from backend.safety import tip_over
 from backend.safety.alarms import Alarm
 from backend.safety.partner import part
 from backend.safety.record import Concern, Level
@@ -93,6 +94,8 @@ def _how(episode: Episode, verdict: Concern | None) -> str:
         return "no longer judged"
     if episode.worst.level is Level.UNKNOWN:
         return "data came back"
+    if verdict.name == tip_over.NAME:
+        return "stands firmly again"
     if verdict.evidence is None:
         return "out of reach of each other"
     nearest = verdict.evidence

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from backend.machine.model import Machine
-from backend.safety import people_words, site
+from backend.safety import people_words, site, tip_over
 from backend.safety.partner import part
 from backend.safety.record import Concern, Level
 
@@ -54,6 +54,8 @@ def detail(concern: Concern, machine: Machine, labels: dict[str, str]) -> str:
     own = labels.get(concern.machine, concern.machine.upper())
     if concern.name == people_words.NAME:
         return people_words.detail(concern, own, tuple(directions(machine).values()))
+    if concern.level is Level.UNKNOWN and concern.name == tip_over.NAME:
+        return f"The site asks for it: do not move {own}. State its masses, measure its slope."
     if concern.level is Level.UNKNOWN:
         return f"Clearance unknown: do not move {own}. Check radio and sensors of the one named."
     limited, free = [], []
@@ -75,6 +77,8 @@ def detail(concern: Concern, machine: Machine, labels: dict[str, str]) -> str:
         parts.append(f"Advice: {', '.join(limited)}.")
     if free:
         parts.append(f"Free: {', '.join(free)}.")
+    if concern.name == tip_over.NAME and not parts:
+        return "No lever is limited by it."
     return " ".join(parts) or "No joint of this machine shortens the distance."
 
 

@@ -26,6 +26,7 @@ from backend.site.tables import (
     Safety,
     SiteMachine,
     SiteTable,
+    Stability,
     Sun,
 )
 from backend.spatial.boxes import Boxes
@@ -56,6 +57,7 @@ class Site:
     watch: People | None = None
     people: tuple[Person, ...] = ()
     vehicles: tuple[Vehicle, ...] = ()
+    stability: Stability = field(default_factory=Stability)
 
     @property
     def folder(self) -> Path:
@@ -136,6 +138,7 @@ def parse_site(data: dict[str, Any], path: Path) -> Site:
         watch=table.people,
         people=table.person,
         vehicles=table.vehicle,
+        stability=table.stability,
     )
 
 

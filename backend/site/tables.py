@@ -56,6 +56,24 @@ class Safety(Table):
         return self
 
 
+class Stability(Table):
+    """Tipping over: keep, slow: shares of the way from the middle to an edge of the tracks that
+    must be left, and below which it is told; limits: whether motions are limited by it; required:
+    whether a machine may not move of which it is not known.
+    """
+
+    keep: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.1
+    slow: Annotated[float, Field(gt=0.0, le=1.0)] = 0.25
+    limits: bool = True
+    required: bool = False
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Stability:
+        if self.keep >= self.slow:
+            raise ValueError(f"keep is {self.keep}; allowed is less than slow ({self.slow})")
+        return self
+
+
 class Sun(Table):
     """Resolution (m yaws, n lengths) and link half-width eta [m] of Sun's sets."""
 
@@ -120,13 +138,16 @@ class MachineSim(Table):
 
 
 class SiteMachine(Table):
-    """One machine of the site. Paths are relative to the site file's folder."""
+    """One machine of the site. Paths are relative to the site file's folder; payload: what it
+    carries at most [kg], the sidecar's rated one by default.
+    """
 
     name: MachineName
     model: Annotated[str, Field(min_length=1)]
     label: Annotated[str, Field(max_length=24)] = ""
     sidecar: Annotated[str, Field(min_length=1)] | None = None
     prefix: Prefix = ""
+    payload: NotNegative | None = None
     start: Start | None = None
     topics: MachineTopics = MachineTopics()
     camera: Annotated[tuple[Camera, ...], Field(max_length=MOST)] = ()
@@ -263,6 +284,7 @@ class SiteTable(Table):
     title: str = ""
     frame: Frame
     safety: Safety = Safety()
+    stability: Stability = Stability()
     sun: Sun = Sun()
     rates: Rates = Rates()
     machine: Annotated[tuple[SiteMachine, ...], Field(min_length=1)]

@@ -59,6 +59,29 @@ def allowed_fractions(
     return np.asarray(np.where(home, np.maximum(found, CREEP), found))
 
 
+def travel_fraction(
+    machine: Machine,
+    model: MassModel,
+    support: Polygon,
+    q: Array,
+    rates: Array,
+    lag: float = 0.0,
+    T_site_root: Array | None = None,
+) -> float:
+    """Fraction of the tracks' full speed that they may start towards and brake from, either way.
+
+    The arguments are those of `allowed_fractions`. A creeping speed is left: the slope may be what
+    tips the machine, and driving off it the way out.
+    """
+    a, v = machine.tracks.max_acceleration, machine.tracks.max_speed
+    pulls = _drive(np.outer(LEVELS[1:], [-v, v]), np.array(a), lag)
+    shake = pulls[..., None] * np.array([1.0, 0.0, 0.0])
+    g = down(T_site_root) - shake
+    least = _moments(model, support, q, rates, np.zeros(len(q)), g).min(axis=(1, 2))
+    good = np.logical_and.accumulate(least >= 0.0)
+    return float(max(CREEP, np.where(good, LEVELS[1:], 0.0).max()))
+
+
 def brings_home(
     model: MassModel, support: Polygon, q: Array, T_site_root: Array | None = None
 ) -> BoolArray:

@@ -12,7 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from backend.machine.inverse import inverse
+from backend.machine.kinematics import end_point
 from backend.machine.model import Machine
+from backend.machine.sun_map import sun_angles
 from backend.spatial import transform
 from backend.spatial.types import Array
 from backend.stability.dynamics import down, wrench_of
@@ -20,6 +22,9 @@ from backend.stability.masses import MassModel, mass_model
 from backend.stability.polygon import Polygon, shrunk
 from backend.stability.zmp import moments_of
 
+DIRECTIONS = 36
+"""Of the plan's capacity curve."""
+_REACHES = 25
 _PROBE = 1000.0  # payload whose moments are compared with those of none [kg]
 
 
@@ -68,8 +73,9 @@ def capacity_chart(
     attitude: float,
     T_site_root: Array | None = None,
     least: float = 0.0,
+    elbow: int = 1,
 ) -> CapacityChart:
-    """The capacity with the tip at `height` and the bucket at `attitude` [rad], elbow up.
+    """The capacity with the tip at `height` and the bucket at `attitude` [rad]; elbow: +1 up.
 
     azimuths: (a,) [rad]; reaches: (r,) ascending [m]; T_site_root: (4, 4); as in `lift_capacity`.
     """
@@ -77,7 +83,7 @@ def capacity_chart(
     p_swing = np.stack(
         [reach * np.cos(angle), reach * np.sin(angle), np.full_like(reach, height)], -1
     )
-    found = inverse(machine, transform.apply(machine.arm.T_root_swing, p_swing), attitude)
+    found = inverse(machine, transform.apply(machine.arm.T_root_swing, p_swing), attitude, elbow)
     can = found.reachable & found.within_limits
     payload = lift_capacity(machine, support, found.q, T_site_root, least)
     return CapacityChart(
@@ -89,15 +95,57 @@ def capacity_chart(
 
 
 def farthest(chart: CapacityChart, payload: float) -> Array:
-    """(a,) the greatest charted reach up to which `payload` [kg] may be held everywhere [m].
+    """(a,) the greatest reach up to which `payload` [kg] may be held everywhere [m].
 
-    NaN in directions where it may be held nowhere.
+    Between charted reaches the capacity is taken as straight. NaN in directions where the payload
+    may be held nowhere.
     """
     known = ~np.isnan(chart.payload)
     refused = known & (chart.payload < payload)
     good = known & ~np.logical_or.accumulate(refused, axis=1)
-    reach = np.where(good, chart.reaches, -np.inf).max(axis=1)
-    return np.where(np.isfinite(reach), reach, np.nan)
+    last = chart.reaches.size - 1 - good[:, ::-1].argmax(axis=1)
+    after = np.minimum(last + 1, chart.reaches.size - 1)
+    rows = np.arange(len(good))
+    more, less = chart.payload[rows, last], chart.payload[rows, after]
+    with np.errstate(invalid="ignore"):
+        part = np.where(refused[rows, after] & np.isfinite(more), (more - payload), 0.0)
+        part = part / np.where(more > less, more - less, 1.0)
+    part = np.where(np.isfinite(part), part, 0.0)
+    reach = chart.reaches[last] + part * (chart.reaches[after] - chart.reaches[last])
+    return np.where(good.any(axis=1), reach, np.nan)
+
+
+def holding_reach(
+    machine: Machine,
+    support: Polygon,
+    q: Array,
+    payload: float,
+    T_site_root: Array | None = None,
+    least: float = 0.0,
+) -> Array:
+    """(DIRECTIONS,) up to which reach `payload` [kg] may be held with the tip as high, the bucket
+    at the attitude and the elbow on the side that q (n,) has now [m]; NaN where nowhere.
+
+    Directions are of the tip from the swing axis, in the root frame, evenly from -pi. Tilt and
+    rotate joints are taken at 0. Up to the lengths of the arm's links and the joints' limits.
+    """
+    theta = sun_angles(machine, np.asarray(q, dtype=float))
+    p_root = end_point(machine, np.asarray(q, dtype=float))[None]
+    height = transform.apply(transform.inverse(machine.arm.T_root_swing), p_root)[0, 2]
+    azimuths = np.linspace(-np.pi, np.pi, DIRECTIONS, endpoint=False)
+    reaches = np.linspace(0.0, machine.max_reach, _REACHES)
+    chart = capacity_chart(
+        machine,
+        support,
+        np.asarray(azimuths, dtype=float),
+        np.asarray(reaches, dtype=float),
+        float(height),
+        float(theta.sum()),
+        T_site_root,
+        least,
+        elbow=1 if np.sin(theta[1]) <= 0.0 else -1,
+    )
+    return farthest(chart, payload)
 
 
 def _static(model: MassModel, support: Polygon, q: Array, T_site_root: Array | None) -> Array:

@@ -14,6 +14,7 @@ from cockpit.views.ghost import GhostNodes
 from cockpit.views.inputs import SceneSite, SnapshotSource
 from cockpit.views.joint_space import JointSpace
 from cockpit.views.stage_nodes import StageNodes
+from cockpit.views.use_case_nodes import Shown, UseCaseNodes
 from cockpit.views.zone import OwnNodes
 
 JOINTS = "joints"  # the camera that looks at the joint space
@@ -40,6 +41,8 @@ class Browser:
         self._stages: StageNodes | None = None
         self._stages_shown: frozenset[str] = frozenset()
         self._stages_until = -math.inf
+        self._use_case: UseCaseNodes | None = None
+        self._use_case_shown: Shown | None = None
 
     @property
     def own(self) -> str:
@@ -74,6 +77,10 @@ class Browser:
             self._ghosts[machine] = GhostNodes(self.client.scene, machine, entry)
         self._ghosts[machine].pose(joints, colliding)
 
+    def show_use_case(self, shown: Shown | None) -> None:
+        """A run of a use case from one of its instants on, None for none."""
+        self._use_case_shown = shown
+
     def show_stages(self, shown: frozenset[str], until: float) -> bool:
         """Which stages of detection are shown until then [s], none of none; whether that is new."""
         new = shown != self._stages_shown
@@ -102,6 +109,7 @@ class Browser:
             self._own.update(snapshot, images, ground, lost, self.zone_kind)
             if self._ghost is not None:
                 self._ghosts[self._ghost].update(snapshot)
+            self._update_use_case(snapshot, now)
             looked_at = self.camera == JOINTS
             if looked_at and self._joints is None:
                 label = self._site.machines[self.own].label
@@ -109,3 +117,15 @@ class Browser:
             if self._joints is not None:
                 image = images.image("exact", self.own) if looked_at else None
                 self._joints.update(image, snapshot.state_time + lost, now, looked_at)
+
+    def _update_use_case(self, snapshot: Snapshot, now: float) -> None:
+        shown = self._use_case_shown
+        machine = None if shown is None else shown.run.machine
+        if self._use_case is not None and self._use_case.machine != machine:
+            self._use_case.hide()
+        if shown is None or machine is None:
+            return
+        if self._use_case is None or self._use_case.machine != machine:
+            entry = self._site.machines[machine]
+            self._use_case = UseCaseNodes(self.client.scene, machine, entry)
+        self._use_case.update(shown, snapshot, now)

@@ -15,7 +15,7 @@ from backend.machine import kinematics
 from backend.machine.model import Machine
 from backend.pipeline.records import MachineState, Snapshot
 from backend.spatial.rotation import to_quaternion
-from backend.spatial.types import Array
+from backend.spatial.types import Array, BoolArray
 from cockpit.views import palette
 from cockpit.views.inputs import SceneMachine
 from cockpit.views.shapes import LinkLooks
@@ -48,10 +48,18 @@ def checked_joints(model: Machine, joints: Mapping[str, float] | None) -> dict[s
 class GhostNodes:
     """Nodes of one machine's ghost in one browser; kept when hidden, so that it comes at once."""
 
-    def __init__(self, scene: viser.SceneApi, name: str, entry: SceneMachine) -> None:
+    def __init__(
+        self,
+        scene: viser.SceneApi,
+        name: str,
+        entry: SceneMachine,
+        folder: str = "/whatif",
+        raised: float = RAISED,
+    ) -> None:
         self._name = name
+        self._raised = np.array([0.0, 0.0, raised])
         self._model = entry.model
-        root = f"/whatif/{name}"
+        root = f"{folder}/{name}"
         self._root = scene.add_frame(root, show_axes=False, visible=False)
         self._frames: dict[int, viser.FrameHandle] = {}
         self._meshes: list[viser.MeshHandle] = []
@@ -105,13 +113,26 @@ class GhostNodes:
         """joints: by role [rad], the others stay as they are; colliding: the verdict on it."""
         self._joints = joints
         if colliding != self._colliding:
-            self._colliding = colliding
-            for mesh in self._meshes:
-                mesh.color = palette.GHOST_HIT if colliding else palette.GHOST
-            color = palette.BLOCKED if colliding else palette.TEXT
-            for edges in self._edges:
-                edges.colors = palette.each(color, edges.points)
+            self.paint(colliding)
             self._label.text = WORDS[colliding]
+
+    def paint(self, colliding: bool | None) -> None:
+        """In the colour of a verdict."""
+        self._colliding = colliding
+        for mesh in self._meshes:
+            mesh.color = palette.GHOST_HIT if colliding else palette.GHOST
+        color = palette.BLOCKED if colliding else palette.TEXT
+        for edges in self._edges:
+            edges.colors = palette.each(color, edges.points)
+
+    def stand(self, poses: Array, hidden: BoolArray, words: str, colliding: bool) -> None:
+        """Of no machine's present state: links at poses (L, 4, 4), but for those hidden (L,)."""
+        if colliding != self._colliding:
+            self.paint(colliding)
+        if self._label.text != words:
+            self._label.text = words
+        self._put(poses, hidden)
+        self._root.visible = True
 
     def update(self, snapshot: Snapshot) -> None:
         """Follow the machine's present base; out of sight while that was never known."""
@@ -124,7 +145,9 @@ class GhostNodes:
 
     def _move(self, state: MachineState, real: Array) -> None:
         poses = kinematics.link_poses(self._model, self._q(state), self._base(real))
-        same = np.abs(poses - real).max(axis=(1, 2)) < SAME
+        self._put(poses, np.abs(poses - real).max(axis=(1, 2)) < SAME)
+
+    def _put(self, poses: Array, same: BoolArray) -> None:
         moved = np.abs(poses - self._poses).max(axis=(1, 2))
         for k, frame in self._frames.items():
             frame.visible = not same[k]
@@ -134,7 +157,7 @@ class GhostNodes:
             frame.position = poses[k, :3, 3]
             self._poses[k] = poses[k]
         corners = kinematics.body_boxes(self._model, poses).corners()[self._arm].reshape(-1, 3)
-        above = corners[np.argmax(corners[:, 2])] + [0.0, 0.0, RAISED]
+        above = corners[np.argmax(corners[:, 2])] + self._raised
         if np.abs(above - self._label.position).max() > 5e-4:
             self._label.position = above
 

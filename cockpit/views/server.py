@@ -20,6 +20,7 @@ from cockpit.views.inputs import SceneSite, SnapshotSource
 from cockpit.views.opening import open_server
 from cockpit.views.scene import Scene
 from cockpit.views.stage_nodes import SHOWN
+from cockpit.views.use_case_nodes import Played, Shown
 from cockpit.views.zone import EXACT, ZONE_KINDS
 
 RATE = 25.0  # updates a second while somebody looks
@@ -159,6 +160,23 @@ class View:
             for browser in self._of(page):
                 with browser.client.atomic():
                     browser.show_ghost(machine, wanted, colliding)
+        self._draw_own_now()
+
+    def set_use_case(
+        self, run: Played | None, at: float = 0.0, rate: float = 1.0, page: str | None = None
+    ) -> None:
+        """Play a run of a use case as a ghost, from `at` [s] on and `rate` times as fast as it was;
+        for a short time: a page asks again while it shows it. None takes it out of sight.
+
+        page: without one, in all browsers there are now. Raises ValueError for an unknown machine.
+        """
+        shown = None
+        if run is not None:
+            self._check_machine(run.machine)
+            shown = Shown(run, at, rate, self._clock())
+        with self._lock:
+            for browser in self._of(page):
+                browser.show_use_case(shown)
         self._draw_own_now()
 
     def set_camera(self, name: str, page: str | None = None) -> None:

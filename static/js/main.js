@@ -39,6 +39,7 @@ import { startSeries } from "./series_pointer.js";
 import { sessionKey } from "./keys.js";
 import * as drive from "./drive/start.js";
 import * as gauge from "./gauge/panel.js";
+import * as useCases from "./use_cases/panel.js";
 
 readSizes();
 
@@ -106,6 +107,7 @@ function onKey(event) {
     recording.closeRecording();
     drive.closeDialogs();
     gauge.closeGauge();
+    useCases.closeUseCases();
     hover.hide();
     ghost.unpin();
     alarm.showList(false);
@@ -132,7 +134,7 @@ startLayout(resized);
 startCameras();
 function resized() {
   readSizes();
-  for (const s of [...live, ...images]) s.dirty = true;
+  for (const s of PERIOD.keys()) s.dirty = true;
 }
 addEventListener("resize", resized);
 
@@ -156,6 +158,11 @@ people.startPeople(redrawTrends);
 status.startStatus();
 stages.startStages(socket.send);
 gauge.startGauge();
+const figures = useCases.startUseCases(socket.send, gauge.closeGauge);
+for (const s of figures) {
+  hover.watch(s);
+  PERIOD.set(s, 90);
+}
 drive.startDriving(socket.send);
 
 function onFrame(header, arrays) {
@@ -216,6 +223,7 @@ function tick() {
   if (link() !== "ok" && state.snapshot) for (const s of live) s.dirty = true;
   headers.update();
   gauge.update();
+  useCases.update();
   ghost.age();
   hover.refresh();
 }

@@ -19,9 +19,9 @@ from websockets.typing import Subprotocol
 from backend.control.person import Person
 from backend.shell.access.access import Access
 from backend.shell.access.audit import Audit
-from backend.shell.access.certificates import Tls
 from backend.shell.access.links import Links
 from backend.shell.access.sessions import Sessions
+from backend.shell.access.tls import Tls
 from backend.shell.access.users import Users, add_user, read_users, seal_of
 from backend.shell.app.app import Sources, create_app
 from backend.shell.app.cameras import camera_router

@@ -13,7 +13,8 @@ from cryptography import x509
 from gatehouse import PASSWORD, House, house
 
 from backend.shell.access import certificates
-from backend.shell.access.certificates import Tls, fingerprint, given, self_signed
+from backend.shell.access.certificates import fingerprint, self_signed
+from backend.shell.access.tls import Tls, given
 from cockpit.entry import EntryOptions, decide
 
 NAMES = ("127.0.0.1", "localhost", "::1", "cockpit.example")

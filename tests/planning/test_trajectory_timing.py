@@ -28,7 +28,7 @@ def paper_curve(start: float = np.pi / 6, end: float = 5 * np.pi / 6) -> tuple[T
     dense = np.concatenate(
         [a + np.linspace(0, 1, 30)[:, None] * (b - a) for a, b in pairwise(where)]
     )
-    q, inside = from_cylinder(EX13, dense, np.full(len(dense), -1.0))
+    q, inside = from_cylinder(EX13, dense, np.full(len(dense), -1.9))
     assert inside
     task = Task(q[0], np.zeros(3), payload=400.0, share=0.2)
     return task, curve_along(q, 1.0 / EX13.max_velocity, 0.4)

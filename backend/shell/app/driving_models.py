@@ -65,6 +65,18 @@ class DecisionModel(BaseModel):
     method: MethodModel
 
 
+class FollowModel(BaseModel):
+    """A trajectory that is followed while the dead-man is held."""
+
+    plan: str = Field(description="its name")
+    at: float = Field(description="the path's own time [s]")
+    duration: float = Field(description="of the path [s]")
+    pace: float = Field(description="how fast the path's time runs, 0..1")
+    error: dict[str, float] = Field(description="joints told minus seen, by role [rad]")
+    ended: str = Field(description="why it is over, empty while it is not")
+    arrived: bool
+
+
 class SeatModel(BaseModel):
     """One page in front of which somebody sits."""
 
@@ -79,6 +91,9 @@ class SeatModel(BaseModel):
     sticks: SticksModel
     consoles: dict[str, ConsoleModel] = Field(description="by machine")
     decision: dict[str, DecisionModel] = Field(description="by machine that is held")
+    follow: dict[str, FollowModel] = Field(
+        default_factory=dict, description="by machine that a trajectory is followed with"
+    )
 
 
 class DrivingModel(BaseModel):

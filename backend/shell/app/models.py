@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from backend.documents.people import PeopleModel
+from backend.documents.stability import StabilityModel
 from backend.documents.working_area import WorkingAreaModel
 from backend.shell.app.driving_models import DrivingModel
 
@@ -194,6 +195,9 @@ class SnapshotModel(BaseModel):
         None, description="what holds of the working gauge, see /api/gauge"
     )
     people: PeopleModel | None = Field(None, description="null where the site has no LiDAR")
+    stability: dict[str, StabilityModel] = Field(
+        default_factory=dict, description="by machine; empty where tipping over is not judged"
+    )
     images: dict[str, ImageStampModel] = Field(description="newest image by kind and pair")
     health: HealthCountersModel
     backend: BackendModel | None = Field(None, description="of the process that answers")

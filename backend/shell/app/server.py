@@ -10,7 +10,7 @@ import uvicorn
 from fastapi import FastAPI
 
 from backend.errors import InputError
-from backend.shell.access.certificates import Tls
+from backend.shell.access.tls import Tls
 
 
 def bind(host: str, port: int) -> socket.socket:

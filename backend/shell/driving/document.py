@@ -10,6 +10,7 @@ from backend.control.latency import Condition
 from backend.control.seat import Seat
 from backend.machine.model import Machine
 from backend.safety.limiter import Decision
+from backend.shell.driving.follows import Followed
 from backend.shell.driving.leases import Held
 from backend.shell.driving.methods import Told
 from backend.shell.driving.outlet import TRACKS
@@ -43,9 +44,11 @@ def seat_document(
     refused: Mapping[str, str],
     decisions: Mapping[str, tuple[Decision, Told]],
     machines: Mapping[str, Machine],
+    follows: Mapping[str, Followed | None],
 ) -> dict[str, Any]:
     """name: of the seat; refused: by machine, what its last request was answered with; decisions:
-    by machine, with what the seat's method made of the wish before.
+    by machine, with what the seat's method made of the wish before; follows: by machine, what the
+    seat follows with it.
     """
     mine = [machine for machine, lease in held.items() if lease.seat == name]
     return {
@@ -73,6 +76,25 @@ def seat_document(
             for machine in mine
             if machine in decisions
         },
+        "follow": {
+            machine: follow_document(one, machines[machine])
+            for machine, one in follows.items()
+            if one is not None
+        },
+    }
+
+
+def follow_document(followed: Followed, machine: Machine) -> dict[str, Any]:
+    follow = followed.follow
+    errors = [0.0] * len(machine.joints) if follow.error is None else follow.error.tolist()
+    return {
+        "plan": followed.plan,
+        "at": follow.at,
+        "duration": follow.trajectory.duration,
+        "pace": follow.pace,
+        "error": {joint.role: e for joint, e in zip(machine.joints, errors, strict=True)},
+        "ended": follow.ended,
+        "arrived": follow.arrived,
     }
 
 

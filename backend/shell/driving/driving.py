@@ -26,6 +26,7 @@ from backend.safety.limiter import Decision, Latch, limit, open_latch
 from backend.safety.limits import Delay
 from backend.shell.driving import pages
 from backend.shell.driving.document import machine_document, seat_document
+from backend.shell.driving.follows import Follows, Plans
 from backend.shell.driving.leases import REFRESH, Held, Leases
 from backend.shell.driving.methods import Methods, Told
 from backend.shell.driving.outlet import Outlet
@@ -56,7 +57,7 @@ class Driving:
     """All seats of one cockpit. Thread-safe; `cycle` belongs to the fast loop.
 
     machines: those that may be driven from here; statuses: the newest reports of all agents;
-    methods: what shapes the wishes before the limiter.
+    methods: what shapes the wishes before the limiter; plans: what may be followed.
     """
 
     def __init__(
@@ -68,6 +69,7 @@ class Driving:
         methods: Methods,
         event: Event = lambda *_: None,
         clock: Callable[[], float] = time.monotonic,
+        plans: Plans = lambda machine, plan: None,
     ) -> None:
         self._machines = dict(machines)
         self._outlets = dict(outlets)
@@ -78,6 +80,7 @@ class Driving:
         self._clock = clock
         self._lock = threading.Lock()
         self._seats: dict[str, Seat] = {}
+        self._follows = Follows(plans)
         self._decisions: dict[str, tuple[Decision, Told]] = {}
         self._fencing: dict[str, _Fencing] = {}
         self._stopped: dict[str, str] = {}  # machines that nobody has reset since, and why
@@ -150,11 +153,18 @@ class Driving:
                     self._stopped.pop(machine, None)
             present = dict(self._seats)
         decisions = {
-            machine: self._drive(machine, present[lease.seat], lease, snapshot)
+            machine: self._drive(machine, present[lease.seat], lease, snapshot, now)
             for machine, lease in held.items()
             if lease.seat in present
         }
         self._decisions = decisions
+        with self._lock:
+            over = self._follows.ended()
+        told += [
+            (present[one.seat].person.who, {"machine": machine, "follow": one.follow.ended})
+            for machine, one in over
+            if one.seat in present
+        ]
         for who, details in told:
             self._event("console", who, details)
 
@@ -192,13 +202,14 @@ class Driving:
                     {machine: self._leases.refused(name, machine) for machine in self._machines},
                     self._decisions,
                     self._machines,
+                    {machine: self._follows.of(machine, name) for machine in self._machines},
                 )
                 for name, seat in present.items()
             },
         }
 
     def _drive(
-        self, name: str, seat: Seat, lease: Held, snapshot: Snapshot
+        self, name: str, seat: Seat, lease: Held, snapshot: Snapshot, now: float
     ) -> tuple[Decision, Told]:
         machine, outlet = self._machines[name], self._outlets[name]
         fencing = self._fencing.get(name)
@@ -209,6 +220,9 @@ class Driving:
         up = min(link.round_trip, MOST_UP)
         delay = Delay(up, math.inf if link.locked else link.round_trip)
         sticks, override = seats.wish(seat, name, machine), seats.override(seat, name)
+        with self._lock:
+            sat = lease.seat, seat, lease.token
+            sticks = self._follows.wish(name, machine, sat, snapshot, delay, now) or sticks
         shaped, told = self._methods.shape(
             name, seat.setting.method, sticks, snapshot, overridden=override is not None
         )
@@ -289,15 +303,34 @@ class Driving:
 
     def _hear(self, name: str, said: pages.Said) -> None:
         now = self._clock()
+        if isinstance(said, pages.FollowSaid):
+            return self._follow(name, said)
         with self._lock:
             seat = self._seats.get(name)
             if seat is None:
-                return
+                return None
             self._seats[name] = _heard(seat, said, now)
         if not isinstance(said, pages.SticksSaid):
             kind = type(said).__name__.removesuffix("Said").lower()
             details = {k: getattr(said, k) for k in said.__struct_fields__}
             self._event(kind, seat.person.who, details)
+        return None
+
+    def _follow(self, name: str, said: pages.FollowSaid) -> None:
+        lease = self._leases.all().get(said.machine)
+        with self._lock:
+            seat = self._seats.get(name)
+            if seat is None:
+                return
+            if said.do == "drop":
+                self._follows.drop(said.machine, name)
+                refused = ""
+            elif lease is None or lease.seat != name:
+                refused = "who follows holds the machine's lease"
+            else:
+                refused = self._follows.accept(said.machine, name, lease.token, said.plan)
+        details = {"do": said.do, "machine": said.machine, "plan": said.plan, "refused": refused}
+        self._event("follow", seat.person.who, details)
 
 
 def _heard(seat: Seat, said: pages.Said, now: float) -> Seat:

@@ -87,6 +87,14 @@ class OverrideSaid(msgspec.Struct, tag_field="type", tag="override"):
     reason: Text
 
 
+class FollowSaid(msgspec.Struct, tag_field="type", tag="follow"):
+    """plan: the name of a trajectory that was planned for the machine."""
+
+    do: Literal["accept", "drop"]
+    machine: str
+    plan: Text = ""
+
+
 Said = (
     SticksSaid
     | StopSaid
@@ -96,8 +104,11 @@ Said = (
     | DriveSaid
     | SettingSaid
     | OverrideSaid
+    | FollowSaid
 )
-KINDS = frozenset(("sticks", "stop", "reset", "pause", "lease", "drive", "setting", "override"))
+KINDS = frozenset(
+    ("sticks", "stop", "reset", "pause", "lease", "drive", "setting", "override", "follow")
+)
 
 
 def parse(message: dict[str, Any]) -> Said | None:

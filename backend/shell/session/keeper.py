@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from backend.errors import InputError
-from backend.shell.priority import set_niceness
+from backend.shell.priority import AFTER, set_niceness
 from backend.shell.session.format import Header, Message
 from backend.shell.session.repair import last_sequence, list_parts, repair_last
 from backend.shell.session.ring import (
@@ -31,8 +31,10 @@ from backend.shell.session.writer import SessionWriter
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 """Blocked while the process starts."""
-NICENESS = 5
-"""Everything that an operator sees goes first."""
+NICENESS = AFTER
+"""Before the images: it takes a hundredth of a processor, and an overloaded computer's last seconds
+are those that somebody will want to see.
+"""
 CHUNK_SECONDS = 0.5  # at most this much is in a chunk
 SPACE_PERIOD = 0.5  # between two looks at the disk's free space [s]
 TRIES = 50  # to finish a part after a failed write

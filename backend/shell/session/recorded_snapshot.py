@@ -14,7 +14,9 @@ from typing import Any
 
 import numpy as np
 
+from backend.documents.stability import read_stability
 from backend.documents.working_area import read_working_area
+from backend.errors import InputError
 from backend.fusion.pose import FusedPose, StreamStatus, Validity
 from backend.fusion.samples import Fix
 from backend.machine.model import Machine
@@ -58,7 +60,7 @@ def recorded_snapshot(
     """
     try:
         return replace(_snapshot(document, config), gauge=_gauge(document, choices))
-    except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
+    except (KeyError, TypeError, ValueError, AttributeError, IndexError, InputError) as error:
         raise NotASnapshot(f"a recorded snapshot cannot be read ({error!r})") from error
 
 
@@ -104,6 +106,11 @@ def _snapshot(document: Document, config: Config) -> Snapshot:
             if name in known
         },
         notices=tuple(Notice(**notice) for notice in document.get("notices", ())),
+        stability={
+            name: read_stability(one)
+            for name, one in document.get("stability", {}).items()
+            if name in known
+        },
         people=recorded_people(document.get("people"), float(document["time"]), config),
     )
 

@@ -17,6 +17,7 @@ import { inForce } from "../gauge/model.js";
 import { insideWords } from "../people/model.js";
 import { areaKey, drawAreas, hasAreas, tellAreas } from "./plan_areas.js";
 import { drawPeople, peopleLines, personSwatch } from "./plan_people.js";
+import { drawStability, stabilityKey, stabilityWords } from "./plan_stability.js";
 import { distanceText, drawZones, outlineSun, view as zoneView, zoneExit, zoneLegend, zoneLines, zoneNote } from "./plan_zone.js";
 import { around, aroundLegend, aroundLines, drawAround, freeExit, nearestNote, nearestText, view as aroundView } from "./plan_around.js";
 
@@ -96,6 +97,7 @@ function paint(g, width, height, dpr) {
   const exit = layers.length && exact ? freeExit(g, exact, stale, layers, own, inside) : exact ? zoneExit(g, exact, own) : exitArrow(g, own, zone) ?? freeExit(g, null, true, layers, own, inside);
   const nearest = nearestLine(g);
   for (const name of names()) base(g, name);
+  const stability = drawStability(g, dpr);
   const areas = tellAreas(g);
   const seen = drawPeople(g);
   north(g, turn);
@@ -114,15 +116,16 @@ function paint(g, width, height, dpr) {
     ...(exact ? stale ? [[zoneLegend(g, dpr, stale, { as_is: 1 })[0][0], staleZone], ...whose] : [...(first ? [first] : []), ...whose, ...others]
       : [[swatches.area(hatch(g, stale ? C.stale : C.partner, dpr), stale ? C.stale : C.partner), stale ? staleZone : "zone for ✚ (Sun)"], ...whose]),
     ...(rows > 1 ? [] : [[swatches.line(C.text), "reach now"], [swatches.line(C.text, [4, 3], 1.5), "max"]]),
+    ...stabilityKey(),
     ...(seen?.tracks.length ? [[swatches.glyph(personSwatch), "person"]] : []),
   ]);
   return {
     state: {
       own: state.own, partner: state.partner, playback: replaying(), width: view.width, centre: view.centre, up: view.tracksUp ? "tracks" : "north",
-      base: own.position?.slice(0, 2), zone: zone.length, zones, around: drawn, note, shown: how, zone_stale: stale, exit, nearest, people: seen, areas, gauge: inForce(), machines: names().filter((name) => machine(name)?.outlines).length,
+      base: own.position?.slice(0, 2), zone: zone.length, zones, around: drawn, note, shown: how, zone_stale: stale, exit, nearest, people: seen, areas, stability, gauge: inForce(), machines: names().filter((name) => machine(name)?.outlines).length,
     },
     age,
-    label: `Plan of ${view.width} m: ${nameOf(state.own)} base at ${own.position_projected ? own.position_projected.slice(0, 2).map((v) => v.toFixed(1)).join(", ") : "unknown"}; nearest distance to ${nameOf(state.partner)} ${nearest === null ? "unknown" : metres(nearest)}${exit ? `; base inside the warning zone by ${metres(exit)}` : ""}${layers.length ? `; ${nearestText(exact, stale, layers)}` : exact ? `; ${distanceText(exact)}` : ""}${insideWords().map((words) => `; ${words}`).join("")}`,
+    label: `Plan of ${view.width} m: ${nameOf(state.own)} base at ${own.position_projected ? own.position_projected.slice(0, 2).map((v) => v.toFixed(1)).join(", ") : "unknown"}; nearest distance to ${nameOf(state.partner)} ${nearest === null ? "unknown" : metres(nearest)}${exit ? `; base inside the warning zone by ${metres(exit)}` : ""}${layers.length ? `; ${nearestText(exact, stale, layers)}` : exact ? `; ${distanceText(exact)}` : ""}${[...stabilityWords(), ...insideWords()].map((words) => `; ${words}`).join("")}`,
   };
 }
 

@@ -1,0 +1,208 @@
+"""How firmly every machine stands, from the fused poses, and what that leaves of its motions.
+
+Accelerations come from the fused joint rates over the last `WINDOW`; one that the sensors' noise
+explains is none, as with the base's velocity (`fusion.motion`), and what noise is left is told as
+the margin's sigma. The limits do not wait for an acceleration to be seen: they are made for the
+hardest start and stop that the drives can do.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from backend.fusion.align import slope, slope_sigma
+from backend.fusion.motion import JOINT_WINDOW, SIGNIFICANT
+from backend.fusion.pose import FusedPose, Validity
+from backend.machine.model import Machine
+from backend.pipeline.config import Config
+from backend.pipeline.records import MachineState
+from backend.safety import tip_over
+from backend.safety.limits import Delay
+from backend.safety.record import Concern
+from backend.safety.tip_over import TipOver
+from backend.spatial.identity import ByIdentity
+from backend.spatial.types import Array
+from backend.stability.allowance import allowed_fractions, travel_fraction
+from backend.stability.capacity import holding_reach
+from backend.stability.masses import why_unknown
+from backend.stability.polygon import shrunk
+from backend.stability.state import Stability, models, stability
+
+WINDOW = 0.2
+"""Of the joint rates whose slope is the acceleration [s]."""
+CURVE_PERIOD = 1.0
+"""Between two curves of how far out a payload may be held [s]."""
+_NO_CURVE: Array = np.zeros(0)
+ADVISED = 0.5
+"""Below this share what may be done is told to those, too, who only look."""
+_SAMPLES = 10  # of the joints in the window of a rate, for its noise
+
+
+@dataclass(frozen=True)
+class Rates:
+    """stamps and joint rates [rad/s] of the last `WINDOW`, oldest first."""
+
+    stamps: tuple[float, ...] = ()
+    rates: tuple[tuple[float, ...], ...] = ()
+
+
+@dataclass(frozen=True)
+class Standing:
+    """What a cycle hands to the next: by machine the recent rates, and how far out it may hold its
+    payload, which is worked out anew every `CURVE_PERIOD`, for one machine a cycle: `holds` with
+    the times of that.
+    """
+
+    recent: Mapping[str, Rates] = field(default_factory=dict)
+    holds: Mapping[str, tuple[float, Array]] = field(default_factory=dict)
+
+
+def following(
+    before: Standing, machines: Mapping[str, MachineState], now: float, config: Config
+) -> Standing:
+    """With the rates of this cycle, and a curve where one is due."""
+    recent = {name: _with(before.recent.get(name), s.pose) for name, s in machines.items()}
+    known = [name for name, state in machines.items() if not _why(state, name, config)]
+    holds = {name: one for name, one in before.holds.items() if name in known}
+    made = {name: holds.get(name, (-math.inf, _NO_CURVE))[0] for name in known}
+    due = [name for name, at in made.items() if now - at >= CURVE_PERIOD]
+    rules = config.stability
+    if due and rules is not None:
+        name = min(due, key=lambda one: made[one])
+        holds[name] = now, _curve(config.machines[name], machines[name], name, config, rules)
+    return Standing(recent, holds)
+
+
+def standing(
+    memory: Standing, machines: Mapping[str, MachineState], config: Config
+) -> dict[str, Stability]:
+    """By machine. memory: with the rates of this cycle."""
+    rules = config.stability
+    if rules is None:
+        return {}
+    return {name: _of(name, state, memory, config, rules) for name, state in machines.items()}
+
+
+def concerns(
+    found: Mapping[str, Stability],
+    machines: Mapping[str, MachineState],
+    driven: frozenset[str],
+    now: float,
+    config: Config,
+) -> tuple[Concern, ...]:
+    """Of the own machines; none of a machine about which nothing is known, unless required.
+
+    Limits are worked out for machines that somebody drives, and as advice below `ADVISED`.
+    """
+    rules = config.stability
+    if rules is None:
+        return ()
+    made = []
+    for name in config.own:
+        state, label = found[name], config.labels[name]
+        machine = config.machines[name]
+        if state.reason:
+            if rules.required:
+                joints = len(machine.joints)
+                made.append(tip_over.unknown(name, label, joints, state.reason, now))
+            continue
+        allowed, travel = np.ones((len(machine.joints), 2)), np.ones(2)
+        if rules.limits and (name in driven or not state.share > ADVISED):
+            allowed, travel = _left(machine, state, machines[name], config, rules)
+        made.append(
+            tip_over.judge(name, label, state.share, state.edge, allowed, travel, rules, now)
+        )
+    return tuple(made)
+
+
+def _payload(name: str, config: Config, rules: TipOver) -> float:
+    return rules.payload.get(name, config.machines[name].payload)
+
+
+def _why(state: MachineState, name: str, config: Config) -> str:
+    """Why nothing is known of a machine, else empty."""
+    pose = state.pose
+    why = why_unknown(config.machines[name])
+    if not why and (pose.validity is not Validity.VALID or state.body is None):
+        why = pose.reasons[0] if pose.reasons else "the pose is unknown"
+    if not why and not _slope_known(pose):
+        why = "the slope is not measured"
+    return why
+
+
+def _curve(
+    machine: Machine, state: MachineState, name: str, config: Config, rules: TipOver
+) -> Array:
+    assert state.body is not None
+    payload = _payload(name, config, rules)
+    _, support = models(ByIdentity(machine), payload)
+    T = state.body.link_poses[0]
+    return holding_reach(machine, support, state.pose.joints, payload, T, rules.keep)
+
+
+def _of(
+    name: str, state: MachineState, memory: Standing, config: Config, rules: TipOver
+) -> Stability:
+    why = _why(state, name, config)
+    if why:
+        return Stability(why)
+    assert state.body is not None
+    machine, pose, recent = config.machines[name], state.pose, memory.recent[name]
+    # A line through the joint's samples in its window: sigma sqrt(12 / n) / window.
+    noise = pose.joint_sigmas * math.sqrt(12.0 / _SAMPLES) / JOINT_WINDOW
+    rates, accelerations, spread = pose.joint_velocities, np.zeros(len(machine.joints)), 0.0 * noise
+    if len(recent.stamps) > 2 and recent.stamps[-1] - recent.stamps[0] > 0.5 * WINDOW:
+        stamps = list(recent.stamps)
+        seen = np.array(slope(stamps, list(recent.rates), (False,) * len(rates)))
+        # Rates of overlapping windows err together: as few of them count as fit side by side.
+        apart = max(len(stamps) * JOINT_WINDOW / (stamps[-1] - stamps[0]), 1.0)
+        spread = noise * min(slope_sigma(stamps, 1.0) * math.sqrt(min(apart, len(stamps))), 1e3)
+        accelerations = np.where(np.abs(seen) > SIGNIFICANT * spread, seen, 0.0)
+        # Beyond twice what a drive can do a rate was mistaken; of what it can, any is as likely.
+        most = 2.0 * machine.max_acceleration
+        accelerations = np.clip(accelerations, -most, most)
+        spread = np.minimum(spread, machine.max_acceleration / math.sqrt(3.0))
+    found = stability(
+        machine,
+        _payload(name, config, rules),
+        pose.joints,
+        rates,
+        accelerations,
+        (noise, spread),
+        state.body.link_poses[0],
+    )
+    return replace(found, holds=memory.holds.get(name, (0.0, _NO_CURVE))[1])
+
+
+def _slope_known(pose: FusedPose) -> bool:
+    attitude = pose.streams.get("attitude")
+    return attitude is not None and attitude.received > attitude.rejected
+
+
+def _left(
+    machine: Machine, state: Stability, placed: MachineState, config: Config, rules: TipOver
+) -> tuple[Array, Array]:
+    assert placed.body is not None
+    model, support = models(ByIdentity(machine), state.payload)
+    kept, T = shrunk(support, rules.keep), placed.body.link_poses[0]
+    pose, lags = placed.pose, Delay(0.0, 0.0)
+    args = machine, model, kept, pose.joints, pose.joint_velocities
+    allowed = allowed_fractions(*args, config.stop_latency, lags.joint_lag, T)
+    fraction = travel_fraction(*args, lags.track_lag, T)
+    return allowed, np.full(2, fraction)
+
+
+def _with(before: Rates | None, pose: FusedPose) -> Rates:
+    """A rate that is no newer than the last one tells nothing new."""
+    before = before or Rates()
+    if pose.validity is not Validity.VALID:
+        return Rates()
+    if before.stamps and not pose.time > before.stamps[-1]:
+        return before if pose.time == before.stamps[-1] else Rates()
+    keep = sum(stamp < pose.time - WINDOW for stamp in before.stamps)
+    rates = tuple(float(rate) for rate in pose.joint_velocities)
+    return Rates((*before.stamps[keep:], pose.time), (*before.rates[keep:], rates))

@@ -1,0 +1,111 @@
+"""Trajectories that operators accepted, and how far each machine is on its own."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from backend.control import follow as rules
+from backend.control.console import State
+from backend.control.follow import Follow, Trajectory
+from backend.control.seat import Seat
+from backend.machine.model import Machine
+from backend.pipeline.braking import age_of
+from backend.pipeline.records import Snapshot
+from backend.safety.limiter import Wish
+from backend.safety.limits import Delay
+
+MOST_LAG = 0.6
+"""No machine moves when its data and commands take longer [s]."""
+
+Plans = Callable[[str, str], Trajectory | None]
+"""The trajectory of a machine by its plan's name; None where there is none."""
+
+
+@dataclass(frozen=True)
+class Followed:
+    """What a seat follows with one machine. token: of the lease; cycled: when last [s]."""
+
+    seat: str
+    token: int
+    plan: str
+    follow: Follow
+    cycled: float = math.nan
+    told: bool = False
+
+
+class Follows:
+    """By machine. Not thread-safe: whoever holds it locks."""
+
+    def __init__(self, plans: Plans) -> None:
+        self._plans = plans
+        self._by_machine: dict[str, Followed] = {}
+
+    def accept(self, machine: str, seat: str, token: int, plan: str) -> str:
+        """Why not, empty when it is followed from now on, as soon as the dead-man is held."""
+        trajectory = self._plans(machine, plan)
+        if trajectory is None:
+            return f"{plan or 'a plan without a name'}: no trajectory of this machine is called so"
+        self._by_machine[machine] = Followed(seat, token, plan, Follow(trajectory))
+        return ""
+
+    def drop(self, machine: str, seat: str) -> None:
+        """The seat follows nothing with the machine any more."""
+        found = self._by_machine.get(machine)
+        if found is not None and found.seat == seat:
+            del self._by_machine[machine]
+
+    def of(self, machine: str, seat: str) -> Followed | None:
+        found = self._by_machine.get(machine)
+        return found if found is not None and found.seat == seat else None
+
+    def wish(
+        self,
+        name: str,
+        machine: Machine,
+        seat: tuple[str, Seat, int],
+        snapshot: Snapshot,
+        delay: Delay,
+        now: float,
+    ) -> Wish | None:
+        """What following asks of the machine now; None where the sticks alone count.
+
+        seat: its name, itself, the token of its lease. Whoever moves a stick drives by hand.
+        """
+        key, sat, token = seat
+        found = self._by_machine.get(name)
+        if found is None or found.follow.ended or (found.seat, found.token) != (key, token):
+            return None
+        console = sat.desk.consoles.get(name)
+        if console is None or name != sat.desk.driven:
+            return None
+        if console.state in (State.ACTIVE, State.OVERRIDE, State.STOP):
+            why = "a stick was moved" if console.state is State.ACTIVE else console.state.value
+            self._by_machine[name] = replace(found, follow=replace(found.follow, ended=why))
+            return None
+        state = snapshot.machines[name]
+        n = len(machine.joints)
+        lag = float(delay.total(n, age_of(state, snapshot.time))[0]) - 0.5 * delay.up
+        lag = min(lag, MOST_LAG) if math.isfinite(lag) else MOST_LAG
+        dt = now - found.cycled
+        following, rates = rules.advance(
+            found.follow,
+            state.pose.joints,
+            lag,
+            console.state is State.ENABLED,
+            dt if 0.0 < dt < 0.2 else 0.0,
+            np.array([joint.continuous for joint in machine.joints]),
+        )
+        self._by_machine[name] = replace(found, follow=following, cycled=now)
+        full = machine.max_velocity
+        return Wish(np.clip(rates, -full, full), np.zeros(2))
+
+    def ended(self) -> list[tuple[str, Followed]]:
+        """What ended since it was asked last, each once."""
+        found = [(m, f) for m, f in self._by_machine.items() if f.follow.ended and not f.told]
+        for machine, one in found:
+            self._by_machine[machine] = replace(one, told=True)
+        return found
