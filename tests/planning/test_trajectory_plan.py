@@ -74,7 +74,7 @@ def test_a_wall_all_around_is_proven_to_block() -> None:
     goal[0] = np.pi
     obstacles = Obstacles(
         Boxes(
-            np.array([[0.0, s * 2.9, 3.0] for s in (-1, 1)]),
+            np.array([[0.0, s * 3.5, 3.0] for s in (-1, 1)]),  # the counterweight passes between
             np.repeat(np.eye(3)[None], 2, axis=0),
             np.array([[0.4, 2.0, 3.0]] * 2),
         ),

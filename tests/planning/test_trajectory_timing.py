@@ -30,11 +30,11 @@ def paper_curve(start: float = np.pi / 6, end: float = 5 * np.pi / 6) -> tuple[T
     )
     q, inside = from_cylinder(EX13, dense, np.full(len(dense), -1.9))
     assert inside
-    task = Task(q[0], np.zeros(3), payload=400.0, share=0.2)
+    task = Task(q[0], np.zeros(3), payload=1500.0, share=0.2)
     return task, curve_along(q, 1.0 / EX13.max_velocity, 0.4)
 
 
-@pytest.mark.parametrize("share", [0.0, 0.2, 0.3])
+@pytest.mark.parametrize("share", [0.0, 0.2, 0.45])
 def test_the_papers_task_takes_no_longer_than_by_a_convex_solver(share: float) -> None:
     task, curve = paper_curve()
     masses, support = mass_model(EX13, task.payload), shrunk(support_polygon(EX13), share)
@@ -51,7 +51,7 @@ def test_the_papers_task_takes_no_longer_than_by_a_convex_solver(share: float) -
 
 def test_tipping_limits_slow_the_machine_down_and_are_kept_by_the_full_model() -> None:
     task, curve = paper_curve()
-    heavy = mass_model(EX13, 400.0)
+    heavy = mass_model(EX13, 1500.0)
     whole = support_polygon(EX13)
     support = shrunk(whole, 0.45)
     slow = toppra_timing(limit_rows(EX13, task, curve, 200, heavy, support))
@@ -99,7 +99,7 @@ def test_one_joint_alone_follows_the_trapezoid() -> None:
     values, rates, hard = found.sampled(curve, np.array([0.0, found.t[-1] / 2, found.t[-1]]))
     np.testing.assert_allclose(values[[0, -1]], points[[0, -1]], atol=1e-9)
     np.testing.assert_allclose(rates[:, 0], [0.0, v, 0.0], atol=1e-6)
-    assert hard[0, 0] == pytest.approx(a, rel=1e-6)
+    assert hard[0, 0] == pytest.approx(a, rel=1e-5)
 
 
 def test_sampled_motion_is_the_derivative_of_itself() -> None:
@@ -131,7 +131,7 @@ def test_a_curve_keeps_straight_legs_and_is_twice_differentiable() -> None:
 def test_the_attitude_is_kept_on_the_way() -> None:
     _, curve = paper_curve()
     control = curve.spline.c
-    np.testing.assert_allclose(attitude_of(EX13, control), -1.0, atol=1e-9)
+    np.testing.assert_allclose(attitude_of(EX13, control), -1.9, atol=1e-9)
 
 
 def test_times_from_speeds() -> None:
