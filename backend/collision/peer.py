@@ -49,7 +49,9 @@ class FclScene:
 
         half_extents: (b, 3); centers: (m, b, 3) [m]; rotations: (m, b, 3, 3).
         """
-        moved = [fcl_box(np.zeros(3), np.eye(3), np.asarray(half)) for half in half_extents]
+        moved: list[Any] = [
+            fcl_box(np.zeros(3), np.eye(3), np.asarray(half)) for half in half_extents
+        ]
         still, moving = (fcl.DynamicAABBTreeCollisionManager() for _ in range(2))
         still.registerObjects(self._objects)
         moving.registerObjects(moved)

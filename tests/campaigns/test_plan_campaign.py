@@ -10,6 +10,7 @@ import time
 from collections import Counter
 
 import numpy as np
+import pytest
 from plan_tasks import judged, random_task
 
 from backend.documents.plan import proven
@@ -21,6 +22,7 @@ TASKS = int(os.environ.get("PLAN_TASKS", "250"))
 """Of each machine."""
 
 
+@pytest.mark.timeout(7_200)
 def test_random_tasks() -> None:
     violations = []
     for name in ("mini", "ex13"):

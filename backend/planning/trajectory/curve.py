@@ -45,7 +45,7 @@ class Curve:
     @cached_property
     def most_bent(self) -> Array:
         """(n,) upper bound of |q''|: control points bound a B-spline."""
-        return np.abs(self._second.c).max(axis=0)
+        return np.asarray(np.abs(np.asarray(self._second.c)).max(axis=0))
 
 
 def curve_along(points: Array, weights: Array, spacing: float) -> Curve:
@@ -71,7 +71,8 @@ def free_curve(machine: Machine, points: Array, weights: Array, sweep: Sweep) ->
 
     Free means checked along chords from which the curve departs by at most 2 mm, each certified.
     """
-    levers = np.where(machine.body_joints.any(axis=1)[:, None], machine.stretched_levers, 0.0)
+    moved = np.asarray(machine.body_joints.any(axis=1))
+    levers = np.where(moved[:, None], machine.stretched_levers, 0.0)
     lever = levers.max(axis=0)
     for spacing in SPACINGS:
         curve = curve_along(points, weights, spacing)

@@ -71,7 +71,7 @@ class Sweep:
                 self.chain, self.boxes, self.pairs, np.ascontiguousarray(a), np.ascontiguousarray(b)
             )
             if pair >= 0:
-                return self.names[pair]
+                return str(self.names[pair])
         return None
 
     @property

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -97,10 +97,9 @@ def casadi_timing(rows: Rows) -> Timed | None:
         rows.a[:-1, k] * u + rows.b[:-1, k] * x[:-1] - rows.c[:-1, k]
         for k in range(rows.a.shape[1])
     ]
-    quiet = {"ipopt.print_level": 0, "print_time": 0, "ipopt.sb": "yes", "ipopt.max_iter": 500}
-    solver = casadi.nlpsol(
-        "timing", "ipopt", {"x": x, "f": duration, "g": casadi.vertcat(*g)}, quiet
-    )
+    quiet: Any = {"ipopt.print_level": 0, "print_time": 0, "ipopt.sb": "yes", "ipopt.max_iter": 500}
+    problem: Any = {"x": x, "f": duration, "g": casadi.vertcat(*g)}
+    solver = casadi.nlpsol("timing", "ipopt", problem, quiet)
     upper = rows.most.copy()
     upper[[0, -1]] = 0.0
     start = 0.05 * np.minimum(rows.most, 1.0)
