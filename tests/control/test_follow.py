@@ -25,7 +25,7 @@ def trajectory(seconds: float = 6.0) -> Trajectory:
     s = 10 * u**3 - 15 * u**4 + 6 * u**5
     ds = (30 * u**2 - 60 * u**3 + 30 * u**4) / seconds
     start = np.clip(np.array([0.0, 0.2, -0.6, -0.4]), MACHINE.lower, MACHINE.upper)
-    way = np.clip([*start, 1.2, 0.25, 0.3, 0.1], MACHINE.lower, MACHINE.upper) - start
+    way = np.clip(start + np.array([1.2, 0.25, 0.3, 0.1]), MACHINE.lower, MACHINE.upper) - start
     return Trajectory(times, start + s[:, None] * way, ds[:, None] * way)
 
 
