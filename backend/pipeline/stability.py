@@ -37,6 +37,10 @@ WINDOW = 0.2
 CURVE_PERIOD = 1.0
 """Between two curves of how far out a payload may be held [s]."""
 _NO_CURVE: Array = np.zeros(0)
+LEFT_PERIOD = 0.1
+"""Between two judgements of how fast a machine's motions may be [s]; what has changed by the next
+one is covered as if the drives answered that much later.
+"""
 ADVISED = 0.5
 """Below this share what may be done is told to those, too, who only look."""
 _SAMPLES = 10  # of the joints in the window of a rate, for its noise
@@ -54,11 +58,14 @@ class Rates:
 class Standing:
     """What a cycle hands to the next: by machine the recent rates, and how far out it may hold its
     payload, which is worked out anew every `CURVE_PERIOD`, for one machine a cycle: `holds` with
-    the times of that.
+    the times of that; left: when the motions' fractions were judged, and they, (n, 2) and (2,);
+    found: when each machine was judged, and how it stood.
     """
 
     recent: Mapping[str, Rates] = field(default_factory=dict)
     holds: Mapping[str, tuple[float, Array]] = field(default_factory=dict)
+    left: Mapping[str, tuple[float, Array, Array]] = field(default_factory=dict)
+    found: Mapping[str, tuple[float, Stability]] = field(default_factory=dict)
 
 
 def following(
@@ -74,34 +81,50 @@ def following(
     if due and rules is not None:
         name = min(due, key=lambda one: made[one])
         holds[name] = now, _curve(config.machines[name], machines[name], name, config, rules)
-    return Standing(recent, holds)
+    return Standing(recent, holds, before.left, before.found)
 
 
 def standing(
-    memory: Standing, machines: Mapping[str, MachineState], config: Config
-) -> dict[str, Stability]:
-    """By machine. memory: with the rates of this cycle."""
+    memory: Standing, machines: Mapping[str, MachineState], now: float, config: Config
+) -> tuple[Standing, dict[str, Stability]]:
+    """By machine, and the memory of it: every other machine is judged in one cycle, the rest in
+    the next. memory: with the rates of this cycle.
+    """
     rules = config.stability
     if rules is None:
-        return {}
-    return {name: _of(name, state, memory, config, rules) for name, state in machines.items()}
+        return memory, {}
+    reasons = {name: _why(state, name, config) for name, state in machines.items()}
+    known = [name for name, why in reasons.items() if not why]
+    kept = {name: memory.found[name] for name in known if name in memory.found}
+    waiting = sorted(kept, key=lambda name: kept[name][0])[: (len(known) + 1) // 2]
+    for name in known:
+        if name in waiting or name not in kept:
+            kept[name] = now, _of(name, machines[name], memory, config, rules)
+    found = {name: Stability(why) for name, why in reasons.items()}
+    for name, (_, last) in kept.items():
+        holds = memory.holds.get(name, (0.0, _NO_CURVE))[1]
+        found[name] = last if last.holds is holds else replace(last, holds=holds)
+    return replace(memory, found=kept), found
 
 
 def concerns(
+    memory: Standing,
     found: Mapping[str, Stability],
     machines: Mapping[str, MachineState],
     driven: frozenset[str],
     now: float,
     config: Config,
-) -> tuple[Concern, ...]:
+) -> tuple[Standing, tuple[Concern, ...]]:
     """Of the own machines; none of a machine about which nothing is known, unless required.
 
-    Limits are worked out for machines that somebody drives, and as advice below `ADVISED`.
+    Limits are worked out for machines that somebody drives, and as advice below `ADVISED`; every
+    `LEFT_PERIOD`, kept in the memory that is returned.
     """
     rules = config.stability
     if rules is None:
-        return ()
+        return memory, ()
     made = []
+    left: dict[str, tuple[float, Array, Array]] = {}
     for name in config.own:
         state, label = found[name], config.labels[name]
         machine = config.machines[name]
@@ -112,11 +135,15 @@ def concerns(
             continue
         allowed, travel = np.ones((len(machine.joints), 2)), np.ones(2)
         if rules.limits and (name in driven or not state.share > ADVISED):
-            allowed, travel = _left(machine, state, machines[name], config, rules)
+            at, allowed, travel = memory.left.get(name, (-math.inf, allowed, travel))
+            if not 0.0 <= now - at < LEFT_PERIOD:
+                at = now
+                allowed, travel = _left(machine, state, machines[name], config, rules)
+            left[name] = at, allowed, travel
         made.append(
             tip_over.judge(name, label, state.share, state.edge, allowed, travel, rules, now)
         )
-    return tuple(made)
+    return replace(memory, left=left), tuple(made)
 
 
 def _payload(name: str, config: Config, rules: TipOver) -> float:
@@ -147,9 +174,7 @@ def _curve(
 def _of(
     name: str, state: MachineState, memory: Standing, config: Config, rules: TipOver
 ) -> Stability:
-    why = _why(state, name, config)
-    if why:
-        return Stability(why)
+    """Of a machine about which enough is known."""
     assert state.body is not None
     machine, pose, recent = config.machines[name], state.pose, memory.recent[name]
     # A line through the joint's samples in its window: sigma sqrt(12 / n) / window.
@@ -191,8 +216,9 @@ def _left(
     kept, T = shrunk(support, rules.keep), placed.body.link_poses[0]
     pose, lags = placed.pose, Delay(0.0, 0.0)
     args = machine, model, kept, pose.joints, pose.joint_velocities
-    allowed = allowed_fractions(*args, config.stop_latency, lags.joint_lag, T)
-    fraction = travel_fraction(*args, lags.track_lag, T)
+    latency = config.stop_latency + LEFT_PERIOD
+    allowed = allowed_fractions(*args, latency, lags.joint_lag, T)
+    fraction = travel_fraction(*args, lags.track_lag + LEFT_PERIOD, T)
     return allowed, np.full(2, fraction)
 
 

@@ -112,8 +112,9 @@ def step(state: State, inputs: Inputs, now: float, config: Config) -> tuple[Stat
     stood = state.standing
     if config.stability is not None:
         stood = standing_after(state.standing, machines, now, config)
-    stability = standing(stood, machines, config)
-    concerns += tip_overs(stability, machines, driven, now, config)
+    stood, stability = standing(stood, machines, now, config)
+    stood, tipping = tip_overs(stood, stability, machines, driven, now, config)
+    concerns += tipping
     concerns += tuple(unknown_ages(driven, machines, now, config))
     raised = alarms.update(state.alarms, concerns, now)
     health = _health(state.health, inputs, strangers)
