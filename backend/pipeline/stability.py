@@ -37,6 +37,8 @@ WINDOW = 0.2
 CURVE_PERIOD = 1.0
 """Between two curves of how far out a payload may be held [s]."""
 _NO_CURVE: Array = np.zeros(0)
+STATE_PERIOD = 0.04
+"""Between two judgements of how firmly a machine stands, where there are several [s]."""
 LEFT_PERIOD = 0.1
 """Between two judgements of how fast a machine's motions may be [s]; what has changed by the next
 one is covered as if the drives answered that much later.
@@ -58,14 +60,14 @@ class Rates:
 class Standing:
     """What a cycle hands to the next: by machine the recent rates, and how far out it may hold its
     payload, which is worked out anew every `CURVE_PERIOD`, for one machine a cycle: `holds` with
-    the times of that; left: when the motions' fractions were judged, and they, (n, 2) and (2,);
-    found: when each machine was judged, and how it stood.
+    the times of that; left: in which period the motions' fractions were judged, and they, (n, 2)
+    and (2,); found: in which period each machine was judged, and how it stood.
     """
 
     recent: Mapping[str, Rates] = field(default_factory=dict)
     holds: Mapping[str, tuple[float, Array]] = field(default_factory=dict)
-    left: Mapping[str, tuple[float, Array, Array]] = field(default_factory=dict)
-    found: Mapping[str, tuple[float, Stability]] = field(default_factory=dict)
+    left: Mapping[str, tuple[int, Array, Array]] = field(default_factory=dict)
+    found: Mapping[str, tuple[int, Stability]] = field(default_factory=dict)
 
 
 def following(
@@ -87,21 +89,26 @@ def following(
 def standing(
     memory: Standing, machines: Mapping[str, MachineState], now: float, config: Config
 ) -> tuple[Standing, dict[str, Stability]]:
-    """By machine, and the memory of it: every other machine is judged in one cycle, the rest in
-    the next. memory: with the rates of this cycle.
+    """By machine, and the memory of it. memory: with the rates of this cycle.
+
+    Of several machines each is judged every other cycle, in periods that begin at fixed times: what
+    is shown then does not depend on when one began to look.
     """
     rules = config.stability
     if rules is None:
         return memory, {}
-    reasons = {name: _why(state, name, config) for name, state in machines.items()}
-    known = [name for name, why in reasons.items() if not why]
-    kept = {name: memory.found[name] for name in known if name in memory.found}
-    waiting = sorted(kept, key=lambda name: kept[name][0])[: (len(known) + 1) // 2]
-    for name in known:
-        if name in waiting or name not in kept:
-            kept[name] = now, _of(name, machines[name], memory, config, rules)
-    found = {name: Stability(why) for name, why in reasons.items()}
-    for name, (_, last) in kept.items():
+    found: dict[str, Stability] = {}
+    kept: dict[str, tuple[int, Stability]] = {}
+    for k, (name, state) in enumerate(machines.items()):
+        why = _why(state, name, config)
+        if why:
+            found[name] = Stability(why)
+            continue
+        period = math.floor(now / STATE_PERIOD + k / len(machines))
+        at, last = memory.found.get(name, (None, None))
+        if last is None or at != period or len(machines) == 1:
+            last = _of(name, state, memory, config, rules)
+        kept[name] = period, last
         holds = memory.holds.get(name, (0.0, _NO_CURVE))[1]
         found[name] = last if last.holds is holds else replace(last, holds=holds)
     return replace(memory, found=kept), found
@@ -124,7 +131,8 @@ def concerns(
     if rules is None:
         return memory, ()
     made = []
-    left: dict[str, tuple[float, Array, Array]] = {}
+    left: dict[str, tuple[int, Array, Array]] = {}
+    period = math.floor(now / LEFT_PERIOD)
     for name in config.own:
         state, label = found[name], config.labels[name]
         machine = config.machines[name]
@@ -135,11 +143,10 @@ def concerns(
             continue
         allowed, travel = np.ones((len(machine.joints), 2)), np.ones(2)
         if rules.limits and (name in driven or not state.share > ADVISED):
-            at, allowed, travel = memory.left.get(name, (-math.inf, allowed, travel))
-            if not 0.0 <= now - at < LEFT_PERIOD:
-                at = now
+            at, allowed, travel = memory.left.get(name, (None, allowed, travel))
+            if at != period:
                 allowed, travel = _left(machine, state, machines[name], config, rules)
-            left[name] = at, allowed, travel
+            left[name] = period, allowed, travel
         made.append(
             tip_over.judge(name, label, state.share, state.edge, allowed, travel, rules, now)
         )
