@@ -13,10 +13,9 @@ from backend.documents.state import MachineStateDocument, velocity_vector
 from backend.fusion.pose import FusedPose
 from backend.machine.model import Machine
 from backend.pipeline.records import Body3D
-from backend.stability.capacity import lift_capacity
 from backend.stability.masses import why_unknown
 from backend.stability.polygon import polygon, support_polygon
-from backend.stability.state import Stability, stability
+from backend.stability.records import Stability
 
 Number = Annotated[float | None, Field(description="null when not known")]
 
@@ -70,6 +69,10 @@ def assessed_stability(
     why = why_unknown(machine)
     if why:
         return stability_document(Stability(why)) | {"lift_capacity": math.nan}
+    # Loaded only here: a page of playback shows what was judged, and need not wait for kernels.
+    from backend.stability.capacity import lift_capacity
+    from backend.stability.state import stability
+
     exact, T = np.zeros(len(machine.joints)), body.link_poses[0]
     motion = pose.joints, pose.joint_velocities, accelerations
     found = stability(machine, document.payload, *motion, (exact, exact), T)

@@ -15,7 +15,7 @@ from backend.safety.record import Concern
 from backend.site.gauge_choice import NO_CHOICE, GaugeChoice
 from backend.spatial.boxes import Boxes
 from backend.spatial.types import Array
-from backend.stability.state import Stability
+from backend.stability.records import Stability
 
 
 @dataclass(frozen=True)

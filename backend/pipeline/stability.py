@@ -30,7 +30,8 @@ from backend.stability.allowance import allowed_fractions, travel_fraction
 from backend.stability.capacity import holding_reach
 from backend.stability.masses import why_unknown
 from backend.stability.polygon import shrunk
-from backend.stability.state import Stability, models, stability
+from backend.stability.records import Stability
+from backend.stability.state import models, stability
 
 WINDOW = 0.2
 """Of the joint rates whose slope is the acceleration [s]."""

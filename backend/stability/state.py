@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, field
 from functools import lru_cache
 
 import numpy as np
@@ -14,35 +12,12 @@ from backend.spatial.types import Array
 from backend.stability.dynamics import ground_wrench
 from backend.stability.masses import MassModel, mass_model
 from backend.stability.polygon import Polygon, support_polygon
+from backend.stability.records import Stability
 from backend.stability.simple_model import critical_lift, critical_swing, two_masses
 from backend.stability.zmp import edge_distances, margin, share, zmp_of
 
 CORNER = 0.15
 """Edges whose shares differ by less than this are named together ("front-left")."""
-
-
-@dataclass(frozen=True)
-class Stability:
-    """reason: why nothing is known, else empty, and then the rest holds. payload: counted with
-    [kg]; support: where it stands; zmp: (2,) root frame [m]; margin: to the nearest edge, negative
-    outside [m]; sigma: of it, from the rates' and accelerations' noise [m]; share: of the way from
-    the middle to an edge that is left, 1 in the middle, 0 on an edge; edge: that it would tip over,
-    in words; critical_lift, critical_swing: of Yamashita's two masses, the lesser of both axes, on
-    level ground [m/s^2, rad/s]; holds: by direction, from `capacity.holding_reach` [m], empty where
-    that was not asked.
-    """
-
-    reason: str
-    payload: float = math.nan
-    support: Polygon | None = None
-    zmp: Array = field(default_factory=lambda: np.full(2, np.nan))
-    margin: float = math.nan
-    sigma: float = math.nan
-    share: float = math.nan
-    edge: str = ""
-    critical_lift: float = math.nan
-    critical_swing: float = math.nan
-    holds: Array = field(default_factory=lambda: np.zeros(0))
 
 
 @lru_cache(maxsize=32)
