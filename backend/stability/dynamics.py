@@ -93,7 +93,10 @@ def wrench_of(model: MassModel, q: Array, qd: Array, qdd: Array, g: Array) -> Wr
 
 
 def _rows(values: Array, batch: tuple[int, ...], width: int) -> Array:
-    return np.ascontiguousarray(np.broadcast_to(values, (*batch, width))).reshape(-1, width)
+    """An own copy, never read-only: each mix of those would be compiled anew, in a live cycle."""
+    rows = np.empty((*batch, width))
+    rows[...] = values
+    return rows.reshape(-1, width)
 
 
 def centre_of_mass(model: MassModel, q: Array) -> Array:

@@ -15,6 +15,8 @@ from live import Backend, all_valid, serve, simulated
 from playwright.sync_api import Browser
 from watched import SIZES, Watched
 
+import backend
+
 pytestmark = [pytest.mark.browser, pytest.mark.processes, pytest.mark.timeout(900)]
 LB = 4  # the dead-man
 # A pad's axes (forwards is negative) that raise each joint's value, in ISO's pattern.
@@ -139,14 +141,22 @@ class Pad:
         raise AssertionError(f"{goal} was not reached: {self.joints()}, {driving[:1500]}")
 
 
+def compiled() -> set[Path]:
+    """Kernels that numba has kept."""
+    return set(Path(backend.__path__[0]).rglob("*.nbc"))
+
+
 @pytest.fixture(scope="module")
 def station() -> Iterator[Backend]:
+    before = compiled()
     with (
         serve("demo", "--no-record") as running,
         simulated("demo", running.endpoint, "left", "right"),
     ):
         running.wait_for(all_valid)
         yield running
+    # Compiling takes a cycle's process seconds, in which every lease ends: it is `backend.warm`'s.
+    assert compiled() - before == set()
 
 
 def test_dig_swing_and_dump_by_stick_while_the_other_works(

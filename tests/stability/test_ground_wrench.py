@@ -11,6 +11,7 @@ from momentum import centre, link_masses, momenta
 from backend.errors import InputError
 from backend.stability.dynamics import centre_of_mass, ground_wrench
 from backend.stability.masses import GRAVITY, mass_model, why_unknown
+from backend.stability.wrench_kernel import wrenches
 
 
 @pytest.mark.parametrize("payload", [0.0, 400.0])
@@ -99,3 +100,14 @@ def test_a_payload_hangs_where_it_is_said_to(ex13, draw):
     moved = [m.total * centre_of_mass(m, q) for m in (empty, at_com, at_tip)]
     way = np.linalg.norm(moved[2] - moved[1], axis=1)
     np.testing.assert_allclose(way, 500.0 * np.linalg.norm(ex13.end_point - here), rtol=1e-9)
+
+
+def test_it_is_compiled_once_whatever_arrays_are_given(ex13):
+    model = mass_model(ex13)
+    plain = np.zeros((3, 4))
+    fixed = plain.copy()
+    fixed.setflags(write=False)
+    for q in (plain, fixed, np.asfortranarray(plain), np.zeros((6, 4))[::2], plain[:1], fixed[0]):
+        for rates in (plain, fixed):
+            ground_wrench(model, q, rates, np.broadcast_to(fixed[0], (3, 4)))
+    assert len(wrenches.signatures) == 1
