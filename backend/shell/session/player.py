@@ -30,7 +30,7 @@ TICK = 0.02  # [s]
 FAST_TICK = 0.04  # above FAST: fewer snapshots, each of more cycles [s]
 FAST = 2.0
 BUDGET = 0.1  # of one turn: what is not done by then is catching up [s]
-STALL = 0.25  # a turn that comes later than this does not jump ahead [s]
+STALL = 1.0  # more than this is not made up for when a computer was held up [s]
 AGAIN = 0.2  # how soon the same snapshot is published again [s]
 NEAR = round(0.05 * SECOND)  # an event this near the cursor is the present one [ns]
 RETURN = SECOND  # while playing, "previous" goes to the event before one this close [ns]
@@ -83,6 +83,7 @@ class Player:
         self._speed = 1.0
         self._loop: tuple[int, int] | None = None
         self._late = -math.inf
+        self._owed = 0  # of the session, by which a turn did not come as far as it should [ns]
         self._published = 0
         self._published_at = -math.inf
         self._documents: dict[int, dict[str, Any]] = {}
@@ -191,10 +192,11 @@ class Player:
         match action:
             case "play" | "pause" | "toggle":
                 self._playing = not self._playing if action == "toggle" else action == "play"
+                self._owed = 0
                 if self._playing and self._cursor >= self._session.end:
                     self._seek(self._loop[0] if self._loop else self._session.begin)
             case "speed":
-                self._speed = value
+                self._speed, self._owed = value, 0
             case "loop":
                 self._loop = value
             case "seek":
@@ -225,12 +227,13 @@ class Player:
         if loop is not None and not loop[0] <= self._cursor < loop[1]:
             self._seek(loop[0])
         end = loop[1] if loop is not None else self._session.end
-        wanted = min(self._cursor + round(elapsed * self._speed * 1e9), end)
+        due = min(elapsed * self._speed * 1e9 + self._owed, STALL * self._speed * 1e9)
+        wanted = min(self._cursor + round(due), end)
         start = self._clock()
         shown, reached = self._track.advance(wanted, self._speed > 1.0, deadline)
         if reached < wanted - SECOND // 50:
             self._late = self._clock()
-        self._cursor = reached
+        self._cursor, self._owed = reached, max(wanted - reached, 0)
         if shown is not None:
             self._publish(shown)
             self.timing.add(start, self._clock())
@@ -239,7 +242,7 @@ class Player:
 
     def _seek(self, time: int, exact: bool = True) -> None:
         """exact: the cursor stands at `time` itself, else at the cycle that is shown."""
-        time = max(time, self._session.begin)
+        time, self._owed = max(time, self._session.begin), 0
         shown = self._track.seek(time)
         if shown is None and (shown := self._track.step()) is not None:
             exact = False  # there is nothing before the first cycle: show it
