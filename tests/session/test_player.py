@@ -175,6 +175,32 @@ def test_it_plays_in_real_time_and_stops_at_the_end(playing: Playing, session: S
     assert playing.player.status()["time"] == pytest.approx((session.end - session.begin) / 1e9)
 
 
+def test_what_a_busy_computer_left_out_is_made_up_for(
+    playing: Playing, session: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    playing.order("speed", 0.5)  # slow, so that any lag left would be seen before the end
+    advance, held = playing.player._track.advance, {"turns": 0}
+
+    def late(time_: int, merge: bool, deadline: float) -> tuple[Any, int]:
+        if held["turns"] < 5:
+            held["turns"] += 1
+            time.sleep(0.1)
+            return None, playing.player._cursor
+        return advance(time_, merge, deadline)
+
+    monkeypatch.setattr(playing.player._track, "advance", late)
+    begun, start = playing.player.status()["time"], time.monotonic()
+    playing.player.do("play")
+
+    def lag() -> float:
+        due = 0.5 * (time.monotonic() - start)
+        return due - (playing.player.status()["time"] - begun)
+
+    playing.wait(lambda: held["turns"] == 5)
+    assert lag() > 0.2
+    playing.wait(lambda: lag() < 0.1, timeout=5.0)
+
+
 def test_at_real_time_every_cycle_is_judged(session: Session, lived: Lived) -> None:
     playing = Playing(session, lived, "evaluated")
     try:
