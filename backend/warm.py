@@ -46,6 +46,8 @@ from backend.spatial.boxes import Boxes
 from backend.spatial.types import Array
 from backend.stability.masses import mass_model
 from backend.stability.polygon import support_polygon
+from backend.stability.resting import cells as tipping_cells
+from backend.stability.resting import resting, tips
 from backend.stability.zmp import edge_moments
 from backend.tracking import tracker
 from backend.tracking.association import associate
@@ -101,6 +103,9 @@ def compile_kernels() -> None:
     cloud = Cloud("own", "lidar", 0.0, _GROUND, np.eye(4), near)
     watch(watch(empty, (cloud,))[0], (cloud,))
     edge_moments(mass_model(machine), support_polygon(machine), q, q, q)
+    rest = resting(machine, 0.0, 0.1)
+    tips(rest, q[None])
+    tipping_cells(rest, q[:4], q[:4], (1, 1, 1, 1), q, q[:4])
     layers = {"partner": near}
     joint4(machine, layers, (3, 3, 3, 3))
     free = certified4(machine, layers, 0.1, (3, 3, 3, 3)).certified_free()

@@ -24,8 +24,8 @@ from backend.spatial.boxes import Boxes, concatenated
 from backend.spatial.identity import ByIdentity
 from backend.spatial.types import AnyArray, Array
 
-PARTNER, SITE, SELF, PEOPLE = 1, 2, 4, 8
-"""Bits of a cell: its centre touches that layer, bodies as built."""
+PARTNER, SITE, SELF, PEOPLE, TIP_OVER = 1, 2, 4, 8, 16
+"""Bits of a cell: its centre touches that layer, bodies as built; or the resting machine tips."""
 
 FREE, COLLIDING = 64, 128
 """Bits of a cell: certified for every configuration in it. With neither, the cell is undecided."""
@@ -33,7 +33,13 @@ FREE, COLLIDING = 64, 128
 ETA_STEP = 0.005
 """Models are made for multiples of this growth [m]."""
 
-LAYER_BITS = {"partner": PARTNER, "site": SITE, "self": SELF, "people": PEOPLE}
+LAYER_BITS = {
+    "partner": PARTNER,
+    "site": SITE,
+    "self": SELF,
+    "people": PEOPLE,
+    "tip-over": TIP_OVER,
+}
 
 
 @dataclass(frozen=True)

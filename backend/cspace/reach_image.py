@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import IntEnum
 
@@ -24,7 +24,9 @@ NEAR = np.deg2rad(5.0)
 
 
 class ReachState(IntEnum):
-    """Of one cell. What is out of reach or beyond a limit is not asked for collision."""
+    """Of one cell. What is out of reach or beyond a limit is not asked for collision. COLLIDING:
+    blocked by any layer.
+    """
 
     FREE = 0
     COLLIDING = 1
@@ -37,9 +39,9 @@ class ReachImage:
     """swing: (s,) joint values [rad]; reach: (r,) of the tip from the swing axis [m], cell centres.
 
     state: (s, r) ReachState as uint8; layers: name -> (s, r) whether a colliding cell touches it,
-    "self" among them; near_limit: (s, r) a joint is within NEAR of its limit, or beyond; height: of
-    the tip above the swing joint's origin, along the swing axis [m]; attitude: of the bucket [rad];
-    elbow: +1 up, -1 down.
+    "self" among them, and those of `judges`; near_limit: (s, r) a joint is within NEAR of its
+    limit, or beyond; height: of the tip above the swing joint's origin, along the swing axis [m];
+    attitude: of the bucket [rad]; elbow: +1 up, -1 down.
     """
 
     swing: Array
@@ -60,13 +62,15 @@ def reach_image(
     layers: Mapping[str, Boxes],
     shape: tuple[int, int] = (90, 60),
     height: float | None = None,
+    judges: Mapping[str, Callable[[Array], BoolArray]] | None = None,
 ) -> ReachImage:
     """Every cell's configuration has the tip at q's height and the bucket at q's attitude.
 
     q: (n,) present joint values [rad]; layers: obstacles in the machine's root frame, by layer;
     height of the tip above the swing joint's origin, along the swing axis [m], the present one when
     None. The elbow stays on its present side. Swing covers the joint's range, a full turn when
-    continuous; reach 0 to the machine's largest.
+    continuous; reach 0 to the machine's largest. judges: of further layers; given configurations
+    (m, n) each tells (m,) which are blocked.
     """
     q = np.asarray(q, dtype=float)
     joint = machine.joints[0]
@@ -107,9 +111,11 @@ def reach_image(
     state[:, ~(slack >= -1e-9)] = ReachState.BEYOND_LIMIT
     state[:, ~solution.reachable] = ReachState.OUT_OF_REACH
     asked = state == ReachState.FREE
-    hit = {name: np.zeros(state.shape, dtype=bool) for name in (*layers, SELF)}
+    judges = judges or {}
+    hit = {name: np.zeros(state.shape, dtype=bool) for name in (*layers, SELF, *judges)}
     against, itself = touching_layers(machine, configurations[asked], layers)
-    for name, found in (*against.items(), (SELF, itself)):
+    judged = [(name, judge(configurations[asked])) for name, judge in judges.items()]
+    for name, found in (*against.items(), (SELF, itself), *judged):
         hit[name][asked] = found
     state[np.any(list(hit.values()), axis=0)] = ReachState.COLLIDING
     near = np.repeat((solution.reachable & (slack < NEAR))[None], len(swing), axis=0)

@@ -2,12 +2,14 @@
 
 Three slices through the present configuration, one bar per joint, the volume over boom, stick and
 bucket at the present swing, and the reach image. Every cell says what it hits and is certified
-free, certified colliding or undecided.
+free, certified colliding or undecided; where the resting machine would tip over, too, is neither
+free nor undecided.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -22,8 +24,10 @@ from backend.machine.stopping import full_stopping_distances, stopping_distances
 from backend.pipeline.config import Config
 from backend.pipeline.records import Snapshot
 from backend.pipeline.surroundings import growth, surroundings_of, why_unknown
+from backend.pipeline.tipping import mark_tipping, resting_now
 from backend.spatial.boxes import Boxes, concatenated
 from backend.spatial.types import AnyArray, Array
+from backend.stability.resting import Resting, tips
 
 ARM = ("swing", "boom", "stick", "bucket")
 PLANES = ((1, 2), (1, 3), (2, 3))  # boom-stick, boom-bucket, stick-bucket
@@ -73,7 +77,9 @@ class OwnImage:
     eta: growth of the bodies for "certified free" [m]; q: (n,) the present joint values [rad];
     volume: (boom, stick, bucket) uint8 at the present swing over volume_edges (3, 2) [rad];
     stopping: (n, 2) how far each joint still moves after a stop is asked for, latency included:
-    at its present rate (signed), at its full rate [rad].
+    at its present rate (signed), at its full rate [rad]; tip_over: empty where cells tell in which
+    postures the machine, at rest, keeps less of its support polygon than it must, else why they do
+    not; None where nobody asks.
     """
 
     own: str
@@ -88,6 +94,7 @@ class OwnImage:
     reach: ReachImage
     tip_height: float | None
     stopping: Array
+    tip_over: str | None = None
 
     @property
     def key(self) -> str:
@@ -96,11 +103,14 @@ class OwnImage:
 
 @dataclass(frozen=True)
 class _Around:
-    """One machine and what it can touch, in its root frame; together: the boxes of all layers."""
+    """One machine and what it can touch, in its root frame; together: the boxes of all layers;
+    rest: how it stands, None where that is not known.
+    """
 
     models: CellModels
     layers: dict[str, Boxes]
     together: Boxes
+    rest: Resting | None
 
 
 def own_machines(snapshot: Snapshot, config: Config) -> list[str]:
@@ -127,9 +137,13 @@ def own_image(
     slack = joint_slack(state.pose)
     models = cell_models(machine, q, eta, slack)
     edges = joint_edges(machine, q)
-    around = _Around(models, layers, concatenated(layers.values()))
+    rest, why = resting_now(snapshot, config, own)
+    around = _Around(models, layers, concatenated(layers.values()), rest)
     volume = _cells(around, edges, q, dict.fromkeys((1, 2, 3), cells.volume))
     bars = joint_bars(machine, q, dict(enumerate(edges)), cells.bar, layers, models.eta, slack)
+    for k, bar in enumerate(bars):
+        grid = _grid(edges, q, {k: cells.bar})
+        mark_tipping(bar.reshape(grid.shape), rest, grid, q, models.slack)
     return OwnImage(
         own=own,
         partners=tuple(name for name in snapshot.machines if name != own),
@@ -140,7 +154,10 @@ def own_image(
         bars=tuple(Bar(role, edges[k], bars[k]) for k, role in enumerate(ARM)),
         volume=volume[0],
         volume_edges=edges[1:],
-        reach=reach_image(machine, q, layers, cells.reach, tip_height),
+        reach=reach_image(
+            *(machine, q, layers, cells.reach, tip_height),
+            judges=None if rest is None else {"tip-over": partial(tips, rest)},
+        ),
         tip_height=tip_height,
         stopping=np.stack(
             [
@@ -149,6 +166,7 @@ def own_image(
             ],
             axis=1,
         ),
+        tip_over=why,
     )
 
 
@@ -198,8 +216,14 @@ def _plane(
 
 def _cells(around: _Around, edges: Array, q: Array, spread: dict[int, int]) -> AnyArray:
     """Cells over the joints of `spread` (joint: cells), the others held at q."""
+    grid = _grid(edges, q, spread)
+    found = coded(around.models, grid, around.layers, around.together)
+    mark_tipping(found, around.rest, grid, q, around.models.slack)
+    return found
+
+
+def _grid(edges: Array, q: Array, spread: dict[int, int]) -> JointGrid:
     lower, upper, shape = q[:4].copy(), q[:4].copy(), [1, 1, 1, 1]
     for k, n in spread.items():
         lower[k], upper[k], shape[k] = edges[k, 0], edges[k, 1], n
-    grid = JointGrid(lower, upper, (shape[0], shape[1], shape[2], shape[3]))
-    return coded(around.models, grid, around.layers, around.together)
+    return JointGrid(lower, upper, (shape[0], shape[1], shape[2], shape[3]))

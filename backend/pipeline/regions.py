@@ -14,6 +14,7 @@ from backend.pipeline.config import Config
 from backend.pipeline.records import MachineMargins, Snapshot
 from backend.pipeline.static_layers import self_not_free, site_not_free
 from backend.pipeline.surroundings import PARTNER, growth, surroundings_of
+from backend.pipeline.tipping import may_tip, resting_now
 from backend.pipeline.working_gauge import site_of
 from backend.spatial.angles import wrap
 from backend.spatial.types import AnyArray, Array
@@ -59,6 +60,9 @@ def regions_image(
     taken |= site_not_free(machine, pose, around, eta, shape)
     taken |= self_not_free(machine, pose.joints, slack, shape)
     free = ~unpacked(taken, shape[3])
+    rest, _ = resting_now(snapshot, config, own)
+    if rest is not None:
+        free &= ~may_tip(rest, grid, pose.joints, slack)
     found = regions(free, (0, 0, 0, 0), machine.joints[0].continuous)
     reached = _reached(found.labels, grid, machine, pose.joints, snapshot.margins[own])
     shares = found.sizes / found.labels.size

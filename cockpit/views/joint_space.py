@@ -26,6 +26,7 @@ PERIOD = 0.2  # [s] between changes of the surfaces: each one sends them again
 COLORS = {
     "people": palette.PEOPLE,
     "partner": palette.PARTNER,
+    "tip-over": palette.TIP_OVER,
     "site": palette.SITE,
     "self": palette.SELF,
     "other": palette.TEXT,

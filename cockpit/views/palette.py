@@ -29,6 +29,7 @@ PARTNER = rgb("#A970F0")
 SITE = rgb("#3E8E78")
 PEOPLE = rgb("#FFFFFF")
 SELF = rgb("#C0B8D9")
+TIP_OVER = rgb("#79E0B6")
 UNDECIDED = rgb("#8A949E")
 BLOCKED = rgb("#FF6B5E")  # a stopping distance that does not end in what is certified free
 GHOST = rgb("#DDE4EA")  # what a machine would look like

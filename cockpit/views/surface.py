@@ -10,16 +10,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from backend.cspace.cells import COLLIDING, FREE, PARTNER, PEOPLE, SELF, SITE
+from backend.cspace.cells import COLLIDING, FREE, PARTNER, PEOPLE, SELF, SITE, TIP_OVER
 from backend.spatial.types import AnyArray, Array, BoolArray
 from cockpit.views.shapes import Float32, UInt32
 
 CAUSES: Mapping[str, int] = {
     "people": PEOPLE,
     "partner": PARTNER,
+    "tip-over": TIP_OVER,
     "site": SITE,
     "self": SELF,
-    "other": 16 | 32,
+    "other": 32,
 }
 """What a cell hits, and its bits; the first that applies gives the colour."""
 

@@ -78,14 +78,16 @@ const layersOf = (byte, kind) => (byte === OUTSIDE ? [] : kind.layers.filter(({ 
 
 export function cellLines(byte, header, kind) {
   if (byte === OUTSIDE) return ["no cell here"];
-  const words = layersOf(byte, kind).map((layer) => ({ partner: (header.partners ?? []).map(nameOf).join(" or ") || "partner", self: "itself" })[layer.name] ?? layer.name);
-  const hit = words.length ? `collides with ${words.join(", ")}` : null;
+  const layers = layersOf(byte, kind), tips = layers.some(({ name }) => name === "tip-over");
+  const words = layers.filter(({ name }) => name !== "tip-over").map((layer) => ({ partner: (header.partners ?? []).map(nameOf).join(" or ") || "partner", self: "itself" })[layer.name] ?? layer.name);
+  const hit = [words.length ? `collides with ${words.join(", ")}` : null, tips ? "tips over, at rest" : null].filter(Boolean).join(", ") || null;
+  const unknown = header.tip_over?.reason ? [`tip-over unknown: ${header.tip_over.reason}`] : [];
   if (kind === reachKind) {
     const plain = { out: "out of reach", beyond: "beyond a joint limit", near: "within 5° of a joint limit" }[kind.plain(byte)];
-    return [[hit ?? (kind.plain(byte) === "out" || kind.plain(byte) === "beyond" ? null : "free at the cell's centre"), plain].filter(Boolean).join(", "), "not certified"];
+    return [...unknown, [hit ?? (kind.plain(byte) === "out" || kind.plain(byte) === "beyond" ? null : "free at the cell's centre"), plain].filter(Boolean).join(", "), "not certified"];
   }
-  const certificate = byte & FREE ? "certified free, whole cell" : byte & COLLIDING ? "certified colliding, whole cell" : "undecided: not certified either way";
-  return [...(hit ? [hit] : byte & FREE ? [] : ["free at the cell's centre"]), certificate];
+  const certificate = byte & FREE ? "certified free, whole cell" : byte & COLLIDING ? `certified ${tips && !words.length ? "tipping" : "colliding"}, whole cell` : "undecided: not certified either way";
+  return [...unknown, ...(hit ? [hit] : byte & FREE ? [] : ["free at the cell's centre"]), certificate];
 }
 
 /** True when stopping ends in what is not certified free, or goes through it from a free cell. */

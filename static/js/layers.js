@@ -5,8 +5,8 @@ import { swatches } from "./pen.js";
 
 export const FREE = 64; // the whole cell is certified free
 export const COLLIDING = 128; // the whole cell is certified colliding
-export const OUTSIDE = 192; // no cell here; never on the wire
-const PARTNER = 1, SITE = 2, SELF = 4, NEAR_LIMIT = 8, BEYOND_LIMIT = 16, OUT_OF_REACH = 32, PEOPLE_IN_REACH = 64;
+export const OUTSIDE = 255; // no cell here; never on the wire
+const PARTNER = 1, SITE = 2, SELF = 4, NEAR_LIMIT = 8, BEYOND_LIMIT = 16, OUT_OF_REACH = 32, PEOPLE_IN_REACH = 64, TIPPING_REACH = 128;
 
 /** On top first. `bit` of joint images and bars. */
 export const LAYERS = [
@@ -18,7 +18,8 @@ export const LAYERS = [
   { bit: 32, name: "other", colour: C.text, hatch: "|" },
 ];
 /** The reach image is not certified and has no undecided cells, but limits. */
-const REACH_LAYERS = LAYERS.filter(({ bit, name }) => bit <= SELF || name === "people").map((layer) => (layer.name === "people" ? { ...layer, bit: PEOPLE_IN_REACH } : layer));
+const REACH_BITS = { people: PEOPLE_IN_REACH, "tip-over": TIPPING_REACH, partner: PARTNER, site: SITE, self: SELF };
+const REACH_LAYERS = LAYERS.filter(({ name }) => name in REACH_BITS).map((layer) => ({ ...layer, bit: REACH_BITS[layer.name] }));
 
 /** Of the reach image: what else a byte tells. */
 export const layerBits = { near: NEAR_LIMIT, beyond: BEYOND_LIMIT, out: OUT_OF_REACH, unreachable: BEYOND_LIMIT | OUT_OF_REACH };
@@ -34,7 +35,8 @@ export const reachKind = {
   name: "reach",
   partner: PARTNER,
   layers: REACH_LAYERS,
-  hits: (b) => b & (7 | PEOPLE_IN_REACH),
+  hits: (b) => b & (7 | PEOPLE_IN_REACH | TIPPING_REACH),
+  touches: (b) => b & (7 | PEOPLE_IN_REACH), // something: Sun's method knows contact only
   undecided: () => false,
   plain: (b) => (b & OUT_OF_REACH ? "out" : b & BEYOND_LIMIT ? "beyond" : b & NEAR_LIMIT ? "near" : null),
 };
@@ -87,7 +89,7 @@ export function paintBytes(bytes, w, h, out, dpr, kind) {
       const mine = hits[b];
       if (mine) {
         // What is missing from some neighbour ends here.
-        let all = 63;
+        let all = 255;
         if (x >= rim) all &= hits[bytes[p - rim]];
         if (x < w - rim) all &= hits[bytes[p + rim]];
         if (y >= rim) all &= hits[bytes[p - rim * w]];

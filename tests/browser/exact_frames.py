@@ -12,7 +12,7 @@ from backend.shell.app.wire import encode
 LIMITS = {"boom": (-0.5, 1.2), "stick": (-2.6, -0.3), "bucket": (-2.0, 0.9)}
 Q = {"swing": math.radians(30), "boom": 0.5, "stick": -1.0, "bucket": 0.2}
 PAIRS = (("boom", "stick"), ("boom", "bucket"), ("stick", "bucket"))
-PARTNER, SITE, SELF, FREE, COLLIDING = 1, 2, 4, 64, 128
+PARTNER, SITE, SELF, TIP_OVER, FREE, COLLIDING, TIPPING_REACH = 1, 2, 4, 16, 64, 128, 128
 CELLS = 48
 PATCH = (0.45, 0.65)  # of the joints' ranges
 
@@ -75,7 +75,8 @@ def share(span: tuple[float, float], part: tuple[float, float]) -> list[float]:
     return [span[0] + p * (span[1] - span[0]) for p in part]
 
 
-def exact(state_time: float, *, own: str = "left", **changes: Any) -> bytes:
+def exact(state_time: float, *, own: str = "left", tipping: bool = False, **changes: Any) -> bytes:
+    """tipping: with postures that reach out too far."""
     arrays: dict[str, np.ndarray] = {}
     slices = []
     for i, (across, up) in enumerate(PAIRS):
@@ -98,6 +99,12 @@ def exact(state_time: float, *, own: str = "left", **changes: Any) -> bytes:
         arrays[f"bar{i}"] = bar_cells(360 if joint == "swing" else 128, blocked[joint])
     swing, reach = (-math.pi, math.pi), (0.0, 4.4)
     arrays["reach"] = reach_cells(180, 88, swing, reach)
+    if tipping:
+        for name in ("slice0", "slice1", "slice2"):
+            cells = arrays[name]
+            cells[3 * len(cells) // 4 :, : len(cells) // 2] |= TIP_OVER | COLLIDING
+            cells[3 * len(cells) // 4 :, : len(cells) // 2] &= 255 - FREE
+        arrays["reach"][20:40, 60:84] |= TIPPING_REACH
     header: dict[str, Any] = {
         "type": "exact",
         "key": own,

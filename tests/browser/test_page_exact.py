@@ -257,6 +257,23 @@ def test_pointing_names_layers_and_certificate(feed: ExactFeed) -> None:
         assert words in text, words
 
 
+def test_where_the_machine_would_tip_is_a_layer(feed: ExactFeed) -> None:
+    feed.changes = {"tipping": True, "tip_over": {"judged": True, "reason": ""}}
+    feed.send(lambda: feed.exact_ready() and "tip-over" in feed.shown("slice-1")["counts"])
+    assert feed.shown("reach")["counts"]["tip-over"] == 20 * 24
+    words = set()
+    for y in (0.5, 0.6, 0.7):
+        feed.page.mouse.move(*feed.at("slice-1", 0.9, y))
+        words |= set(feed.page.inner_text("#hover").splitlines())
+    assert "tips over, at rest" in "\n".join(words)
+    assert "certified tipping, whole cell" in words or "certified colliding, whole cell" in words
+    feed.changes = {"tip_over": {"judged": False, "reason": "the slope is not measured"}}
+    feed.send(lambda: "tip-over" not in feed.shown("slice-1")["counts"])
+    feed.page.mouse.move(*feed.at("slice-1", 0.9, 0.5))
+    assert "tip-over unknown: the slope is not measured" in feed.page.inner_text("#hover")
+    assert feed.errors == []
+
+
 def test_a_click_pins_the_verdict_and_escape_clears_it(feed: ExactFeed) -> None:
     asked = answer(feed, COLLIDING)
     feed.send(feed.exact_ready)

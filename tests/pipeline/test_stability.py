@@ -9,6 +9,7 @@ import math
 import numpy as np
 import pytest
 
+from backend.cspace.cells import FREE, TIP_OVER
 from backend.documents.snapshot import snapshot_document
 from backend.fusion.samples import AttitudeSample, Fix, FixSample, HeadingSample, JointSample
 from backend.machine import kinematics
@@ -16,6 +17,7 @@ from backend.machine.inverse import inverse
 from backend.machine.load import load_machine
 from backend.machine.sun_map import sun_angles
 from backend.pipeline.config import Config
+from backend.pipeline.exact import ARM, Cells, own_image
 from backend.pipeline.records import Inputs, Snapshot
 from backend.pipeline.step import initial, step
 from backend.safety import words
@@ -23,14 +25,15 @@ from backend.safety.arbiter import arbitrate
 from backend.safety.partner import Limits
 from backend.safety.record import Level
 from backend.safety.tip_over import NAME, TipOver
+from backend.shell.app.image_frames import exact_frame
 from backend.shell.app.models import SnapshotModel
-from backend.shell.app.wire import dumps
+from backend.shell.app.wire import decode, dumps
 from backend.shell.session.recorded_snapshot import recorded_snapshot
 from backend.site.site import load_site
 from backend.spatial import rotation, transform
 from backend.stability.masses import mass_model
-from backend.stability.polygon import support_polygon
-from backend.stability.zmp import margin, share, zmp
+from backend.stability.polygon import shrunk, support_polygon
+from backend.stability.zmp import edge_moments, margin, share, zmp
 
 STRETCHED = np.radians([90.0, 15.0, -32.0, -20.0])
 FOLDED = np.radians([0.0, 50.0, -130.0, -60.0])
@@ -242,3 +245,56 @@ def test_the_document_fits_its_schema_and_reads_back(config, payload):
 def test_rules_are_in_order():
     with pytest.raises(ValueError, match="less than slow"):
         TipOver(keep=0.3, slow=0.2)
+
+
+def test_images_tell_where_the_resting_machine_tips(config):
+    heavy = dataclasses.replace(config, stability=TipOver(payload={"a": 5000.0}, keep=0.1))
+    machine, small = heavy.machines["a"], Cells(slice=24, bar=36, volume=10, reach=(24, 16))
+    snapshot = run(heavy, FOLDED, pitch=0.05)
+    image = own_image(snapshot, heavy, "a", small)
+    assert image.tip_over == ""
+    pose, body = snapshot.machines["a"].pose, snapshot.machines["a"].body
+    kept = shrunk(support_polygon(machine), 0.1)
+    model = mass_model(machine, 5000.0)
+
+    def tip(q):
+        still = np.zeros_like(q)
+        return edge_moments(model, kept, q, still, still, body.link_poses[0]).min(axis=-1) < 0.0
+
+    seen = set()
+    for part in image.slices:
+        i, j = ARM.index(part.across), ARM.index(part.up)
+        q = np.broadcast_to(pose.joints, (*part.cells.shape, 4)).copy()
+        q[..., i] = middles(part.x, 24)[:, None]
+        q[..., j] = middles(part.y, 24)
+        np.testing.assert_array_equal((part.cells & TIP_OVER) > 0, tip(q))
+        assert not (part.cells[tip(q)] & FREE).any()
+        seen |= set(np.unique(part.cells & TIP_OVER).tolist())
+    for k, bar in enumerate(image.bars):
+        q = np.tile(pose.joints, (36, 1))
+        q[:, k] = middles(bar.edges, 36)
+        np.testing.assert_array_equal((bar.cells & TIP_OVER) > 0, tip(q))
+    assert seen == {0, TIP_OVER}
+    assert image.reach.layers["tip-over"].any()
+    header, arrays = decode(exact_frame(image))
+    assert header["tip_over"] == {"judged": True, "reason": ""}
+    assert ((arrays["reach"] & 128) > 0).sum() == image.reach.layers["tip-over"].sum()
+
+
+def test_images_say_when_tipping_over_is_not_known(config):
+    machine = dataclasses.replace(config.machines["a"], masses_trusted=False)
+    snapshot = run(dataclasses.replace(config, machines={"a": machine}), FOLDED)
+    unknown = dataclasses.replace(config, machines={"a": machine})
+    image = own_image(snapshot, unknown, "a", Cells(slice=8, bar=8, volume=4, reach=(8, 8)))
+    assert "not trusted" in image.tip_over
+    assert "tip-over" not in image.reach.layers
+    nobody = dataclasses.replace(config, stability=None)
+    image = own_image(
+        run(nobody, FOLDED), nobody, "a", Cells(slice=8, bar=8, volume=4, reach=(8, 8))
+    )
+    assert image.tip_over is None
+
+
+def middles(edges, n):
+    lower, upper = edges
+    return lower + (np.arange(n) + 0.5) * (upper - lower) / n

@@ -20,13 +20,26 @@ from cockpit.views.surface import CAUSES, UNDECIDED, causes, surfaces
 
 EDGES = np.array([[-1.0, 1.0], [-2.0, 1.0], [-1.0, 2.0]])
 BYTES = st.sampled_from(
-    [0, FREE, PARTNER, SITE | COLLIDING, SELF, PARTNER | SITE, SITE | SELF, 8, COLLIDING, 16 | 4]
+    [
+        0,
+        FREE,
+        PARTNER,
+        SITE | COLLIDING,
+        SELF,
+        PARTNER | SITE,
+        SITE | SELF,
+        8,
+        COLLIDING,
+        16 | 4,
+        32,
+    ]
 )
 
 
 def brute_force(cells: np.ndarray) -> dict[str, int]:
     """Sides of cells per name, one by one."""
-    order = [("people", 8), ("partner", 1), ("site", 2), ("self", 4), ("other", 255 - FREE)]
+    order = [("people", 8), ("partner", 1), ("tip-over", 16), ("site", 2), ("self", 4)]
+    order.append(("other", 255 - FREE))
 
     def kind(index: tuple[int, ...]) -> str:
         value = int(cells[index])
@@ -89,10 +102,16 @@ def test_a_block_of_cells_is_a_box() -> None:
 
 
 def test_the_first_cause_gives_the_colour() -> None:
-    cells = np.array([PARTNER | SITE | SELF, SITE | SELF, SELF, 8 | SELF, 16, COLLIDING, 0, FREE])
+    cells = np.array(
+        [PARTNER | SITE | SELF, SITE | SELF, SELF, 8 | SELF, 16, 32, COLLIDING, 0, FREE]
+    )
     names = list(CAUSES)
     found = [names[k] if k >= 0 else None for k in causes(cells.astype(np.uint8))]
-    assert found == ["partner", "site", "self", "people", "other", "other", None, None]
+    assert found == [
+        *("partner", "site", "self", "people", "tip-over", "other", "other"),
+        None,
+        None,
+    ]
 
 
 def test_a_volume_of_the_usual_size_is_drawn_quickly() -> None:

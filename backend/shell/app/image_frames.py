@@ -24,8 +24,10 @@ from backend.spatial.types import AnyArray
 if TYPE_CHECKING:
     from backend.pipeline.along import AlongImage
 
-NEAR_LIMIT, BEYOND_LIMIT, OUT_OF_REACH, PEOPLE_IN_REACH = 8, 16, 32, 64
-"""Bits of a reach cell beside the layers' own."""
+NEAR_LIMIT, BEYOND_LIMIT, OUT_OF_REACH, PEOPLE_IN_REACH, TIPPING_REACH = 8, 16, 32, 64, 128
+"""Bits of a reach cell, which is not certified, beside the layers' own."""
+
+_REACH_BITS = {**LAYER_BITS, "people": PEOPLE_IN_REACH, "tip-over": TIPPING_REACH}
 
 
 def sun_frame(image: PairImage) -> bytes:
@@ -48,7 +50,8 @@ def sun_frame(image: PairImage) -> bytes:
 def exact_frame(image: OwnImage, regions: RegionsImage | None = None) -> bytes:
     """regions: the machine's newest.
 
-    Arrays slice0.., patch0.., bar0.. and reach: uint8 cells; see backend.cspace.cells.
+    Arrays slice0.., patch0.., bar0.. and reach: uint8 cells; see backend.cspace.cells. tip_over:
+    whether cells tell where the resting machine tips, and why they do not, null where nobody asks.
     """
     arrays: dict[str, AnyArray] = {}
     for k, part in enumerate(image.slices):
@@ -94,6 +97,7 @@ def exact_frame(image: OwnImage, regions: RegionsImage | None = None) -> bytes:
             role: {"now": float(image.stopping[k, 0]), "full": float(image.stopping[k, 1])}
             for k, role in enumerate(ARM)
         },
+        "tip_over": {"judged": image.tip_over == "", "reason": image.tip_over},
         "regions": None if regions is None else vars(regions),
     }
     return encode(header, arrays)
@@ -103,7 +107,7 @@ def reach_cells(reach: ReachImage) -> AnyArray:
     """(swing, reach) uint8: the layers' bits where it collides, and the bits above."""
     cells = np.zeros(reach.state.shape, dtype=np.uint8)
     for name, hit in reach.layers.items():
-        cells[hit] |= PEOPLE_IN_REACH if name == "people" else LAYER_BITS[name]
+        cells[hit] |= _REACH_BITS[name]
     cells[reach.near_limit] |= NEAR_LIMIT
     cells[reach.state == ReachState.BEYOND_LIMIT] = BEYOND_LIMIT
     cells[reach.state == ReachState.OUT_OF_REACH] = OUT_OF_REACH

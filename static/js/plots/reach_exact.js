@@ -38,7 +38,7 @@ function compare(entry, sun) {
       const b = data[i * ny + j];
       if (b & layerBits.unreachable) continue;
       const d = reach[0] + ((j + 0.5) / ny) * (reach[1] - reach[0]);
-      const ours = reachKind.hits(b) !== 0, his = from !== null && d > from;
+      const ours = reachKind.touches(b) !== 0, his = from !== null && d > from;
       found.cells += 1;
       if (ours && his) found.both += 1;
       else if (ours) {
