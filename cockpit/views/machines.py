@@ -9,6 +9,7 @@ import viser
 
 from backend.fusion.pose import Validity
 from backend.pipeline.records import Body3D, MachineState
+from backend.safety.record import Level
 from backend.spatial.rotation import to_quaternion
 from backend.spatial.types import Array
 from cockpit.views import palette
@@ -56,7 +57,7 @@ class MachineNodes:
             )
         )
         self._name_height: float | None = None
-        self._ghostly = False
+        self._coloured = False, False  # whether as a ghost, whether in red
 
     def _add_link(self, scene: viser.SceneApi, root: str, index: int, tint: palette.Rgb) -> None:
         meshes, edges = self._entry.looks[index].meshes, self._entry.looks[index].edges
@@ -86,8 +87,12 @@ class MachineNodes:
         dark = self._entry.model.links[link].part in ("tracks", "bucket")
         return palette.IRON if dark else palette.PAINT
 
-    def update(self, state: MachineState, ground: float, now: float, lost: float) -> None:
-        """lost: seconds for which no snapshot came, 0 while they do; ground: its height [m]."""
+    def update(
+        self, state: MachineState, ground: float, now: float, lost: float, tips: bool = False
+    ) -> None:
+        """lost: seconds for which no snapshot came, 0 while they do; ground: its height [m]; tips:
+        whether an edge of its support bears everything, as in Yamashita's figures in red.
+        """
         body, validity = state.body, state.pose.validity
         if lost > 0.0:
             validity = Validity.STALE
@@ -97,9 +102,13 @@ class MachineNodes:
             return
         self._move(body)
         self._draw_reach(body, ground)
-        self._set_ghostly(validity is not Validity.VALID)
+        valid = validity is Validity.VALID
+        self._colour(ghostly=not valid, tips=valid and tips)
         age = oldest(state.pose) + lost
-        self._name.show(name_text(self._entry.label, validity, age), validity, now)
+        words = name_text(self._entry.label, validity, age)
+        if valid and tips:
+            words = f"{words} · TIPS OVER"
+        self._name.show(words, (validity, valid and tips), now)
 
     def _move(self, body: Body3D) -> None:
         change = np.abs(body.link_poses - self._poses).max(axis=(1, 2))
@@ -134,12 +143,13 @@ class MachineNodes:
     def _part(self, body: int) -> str:
         return self._entry.model.part_of_body(body)
 
-    def _set_ghostly(self, ghostly: bool) -> None:
-        if ghostly == self._ghostly:
+    def _colour(self, ghostly: bool, tips: bool) -> None:
+        if (ghostly, tips) == self._coloured:
             return
-        self._ghostly = ghostly
+        self._coloured = ghostly, tips
+        red = palette.LEVEL[Level.STOP]
         for handle, color in self._paint:
-            handle.color = palette.STALE if ghostly else color
+            handle.color = palette.STALE if ghostly else red if tips else color
             handle.opacity = GHOST if ghostly else None
         self._tip.visible = self._drop.visible = self._reach_now.visible = not ghostly
 

@@ -49,7 +49,9 @@ class Scene:
         self._gauge.update(snapshot.gauge.choice)
         for name, nodes in self._machines.items():
             if name in snapshot.machines:
-                nodes.update(snapshot.machines[name], self.ground, now, lost)
+                stands = snapshot.stability.get(name)
+                tips = stands is not None and not stands.reason and stands.share <= 0.0
+                nodes.update(snapshot.machines[name], self.ground, now, lost, tips)
         self._pairs.update(snapshot, now, lost)
         self._people.update(
             seen_people(snapshot.people, snapshot.time), snapshot.time, self.ground, now, lost

@@ -29,6 +29,7 @@ from backend.shell.sim.program_file import load_program
 from backend.shell.sim.radio import OnAir, Radio, receive, send
 from backend.shell.sim.sensors import Sensor, sensors
 from backend.shell.sim.simulate import on_schedule
+from backend.shell.sim.tipping import TIPPING, TOLD, UPRIGHT, leaned, stance_of, tip
 from backend.shell.sim.turning import TurningLidars
 from backend.site.site import Site
 
@@ -36,6 +37,7 @@ LONGEST_STEP = 0.005  # [s]
 CATCH_UP = 2.0  # [s] of a stalled host that are made up for; the rest is left out
 STATUS_PERIOD = 0.1  # [s]
 TRUTH_PERIOD = 0.02  # [s]
+TIP_PERIOD = 0.02  # [s]
 
 
 def run(
@@ -163,6 +165,8 @@ def _loop(
     status_due = truth_due = t
     attitude = start.attitude if start else (0.0, 0.0, 0.0)
     state = on_schedule(program, t - start_at, position, *attitude)
+    stance, lean = stance_of(machine, site.machine(name).payload or 0.0), UPRIGHT
+    shown, judged, judged_at = state, state, t
     while not until.is_set():
         now = time.monotonic() + epoch
         if now - t > CATCH_UP:
@@ -173,10 +177,15 @@ def _loop(
         agent = replace(agent, gate=ear.hear(agent.gate, name, machine))
         while t + dt <= now:
             t += dt
-            agent, state, demand = act(agent, program, hydraulics, state, t - start_at, dt)
-            state = step(state, demand, limits, hydraulics, dt)
+            agent, before, demand = act(agent, program, hydraulics, state, t - start_at, dt)
+            state = shown = step(before, demand, limits, hydraulics, dt)
+            if stance is not None:
+                if t >= judged_at + TIP_PERIOD - 1e-6:
+                    lean = tip(lean, judged, state, stance, t - judged_at)
+                    judged, judged_at = state, t
+                shown = leaned(state, lean, stance)
             if t >= truth_due - 1e-6:  # no radio: partners' cameras go on seeing the machine
-                truth = _truth(machine, site, name, state, t + skew)
+                truth = _truth(machine, site, name, shown, t + skew)
                 wire.outlets["truth"].put(encode_truth(truth))
                 truth_due += TRUTH_PERIOD
             if is_cut(program, t - start_at):
@@ -185,15 +194,16 @@ def _loop(
                 continue
             for i, sensor in enumerate(rig):
                 if t >= due[i] - 1e-6:
-                    message = sensor.topic, sensor.measure(state, t + skew, rng)
+                    message = sensor.topic, sensor.measure(shown, t + skew, rng)
                     wire.on_air = send(wire.on_air, t, message, wire.radio)
                     due[i] = max(due[i] + sensor.period, t - sensor.period)
             if t >= status_due - 1e-6:
-                report = status_of(agent.gate, name, agent.mode.value, t + skew, t - start_at)
+                mode = TIPPING if lean.angle > TOLD else agent.mode.value
+                report = status_of(agent.gate, name, mode, t + skew, t - start_at)
                 status = encode_status(report)
                 wire.on_air = send(wire.on_air, t, ("status", status), wire.radio)
                 status_due += STATUS_PERIOD
-        wire.now = state, t + skew
+        wire.now = shown, t + skew
         arrived, wire.on_air = receive(wire.on_air, now)
         for outlet, payload in arrived:
             wire.outlets[outlet].put(payload)
