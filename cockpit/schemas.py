@@ -24,6 +24,7 @@ from backend.documents.gauge import GaugeDocument
 from backend.documents.gauge_choice import GaugeChoiceFile, GaugeStateDocument
 from backend.documents.people import PeopleModel
 from backend.documents.plan_document import PlanDocument, PlanTaskDocument
+from backend.documents.plan_state import PlanRequest, PlanStateDocument
 from backend.documents.recordings import RecordingsDocument, RecoverDocument
 from backend.documents.session import DiffDocument, SeriesDocument, SessionDocument
 from backend.documents.stability import StabilityModel
@@ -46,6 +47,8 @@ SCHEMAS: dict[str, tuple[type[BaseModel], str]] = {
     "stages": (StagesDocument, "/api/stages: what detection makes of the newest scan"),
     "plan-task": (PlanTaskDocument, "the task that plan reads"),
     "plan": (PlanDocument, "what plan --json prints"),
+    "plan-request": (PlanRequest, "what is posted to /api/plan"),
+    "plan-state": (PlanStateDocument, "/api/plan, and the key plans of a snapshot"),
     "along": (AlongDocument, "what along --json prints"),
     "use-case": (UseCaseDocument, "what use-case --json prints"),
     "use-case-state": (UseCaseStateDocument, "/api/use-case"),

@@ -25,6 +25,7 @@ from backend.shell.app.cameras import camera_router
 from backend.shell.app.feed import Frames
 from backend.shell.app.gauge_api import gauge_router
 from backend.shell.app.metrics import metrics_router
+from backend.shell.app.plan_api import plan_router
 from backend.shell.app.server import WebServer, bind
 from backend.shell.app.stages import stages_router
 from backend.shell.app.use_case_api import use_case_router
@@ -36,6 +37,7 @@ from backend.shell.link.receiver import Receiver
 from backend.shell.link.relay import Relay
 from backend.shell.link.session import open_session
 from backend.shell.link.source import LinkSource
+from backend.shell.plan_desk import PlanDesk, Progress
 from backend.shell.runner import Runner
 from backend.shell.session.recorder import Recorder
 from backend.shell.use_case_desk import UseCaseDesk
@@ -125,7 +127,11 @@ class Station:
         )
         self._closing.callback(self.receiver.close)
         self.people = make_people(self.config, self.receiver)
-        self.driving = make_driving(site, self.config, session, self.receiver, self._event)
+        self.plans = PlanDesk(self.config, self.hub.latest, self._followed, self._event)
+        self._closing.callback(self.plans.close)
+        self.driving = make_driving(
+            site, self.config, session, self.receiver, self._event, self.plans
+        )
         self._closing.callback(self.driving.shut)
         self.runner = Runner(
             self.config,
@@ -175,6 +181,7 @@ class Station:
                 camera_router(make_cameras(site, session)),
                 gauge_router(self.gauge),
                 use_case_router(self.use_cases),
+                plan_router(self.plans),
                 *(() if self.people is None else (stages_router(self.people.look),)),
             ),
             access=access,
@@ -212,6 +219,7 @@ class Station:
         document["backend"] = self.backend()
         document["recording"] = vars(self.recorder.state())
         document["driving"] = self.driving.document()
+        document["plans"] = self.plans.document()
         if self._demo_began is not None:
             document["demo"] = {"elapsed": time.time() - self._demo_began()}
         return document
@@ -259,6 +267,13 @@ class Station:
 
     def _staged(self) -> StagedScan | None:
         return None if self.people is None else self.people.look().stages
+
+    def _followed(self, machine: str) -> Progress | None:
+        found = self.driving.followed(machine)
+        if found is None:
+            return None
+        follow = found.follow
+        return Progress(found.plan, follow.at, follow.ended, follow.arrived)
 
     def _event(self, what: str, who: str, details: dict[str, Any]) -> None:
         """What an operator did with a machine, for the recording and the audit log."""
