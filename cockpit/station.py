@@ -48,6 +48,7 @@ from cockpit.desk import Desk, along_loops, image_loops, load_models, make_confi
 from cockpit.driving import make_driving
 from cockpit.options import Options
 from cockpit.people import make_people
+from cockpit.plan_scene import PlanScene
 from cockpit.recording import make_recorder, recording_sources, site_folder
 from cockpit.resolutions import resolutions
 from cockpit.use_case_scene import UseCaseScene
@@ -110,12 +111,15 @@ class Station:
         found = offers(site, self.config.site)
         self.use_cases = UseCaseDesk(found, self.config.labels, self._event)
         self._closing.callback(self.use_cases.close)
+        self.plans = PlanDesk(self.config, self.hub.latest, self._followed, self._event)
+        self._closing.callback(self.plans.close)
         self._desk = Desk(
             self.config,
             self.hub,
             lambda: self.view,
             self.recorder.action,
             played=UseCaseScene(self.use_cases).played,
+            previewed=PlanScene(self.plans).played,
         )
         kept = state_folder() / "gauge" / f"{site.name}.json"
         self.gauge = GaugeDesk(self.config, self.hub, kept, self._event)
@@ -127,8 +131,6 @@ class Station:
         )
         self._closing.callback(self.receiver.close)
         self.people = make_people(self.config, self.receiver)
-        self.plans = PlanDesk(self.config, self.hub.latest, self._followed, self._event)
-        self._closing.callback(self.plans.close)
         self.driving = make_driving(
             site, self.config, session, self.receiver, self._event, self.plans
         )
