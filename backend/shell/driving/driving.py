@@ -236,7 +236,8 @@ class Driving:
         sticks, override = seats.wish(seat, name, machine), seats.override(seat, name)
         with self._lock:
             sat = lease.seat, seat, lease.token
-            sticks = self._follows.wish(name, machine, sat, snapshot, delay, now) or sticks
+            followed = self._follows.wish(name, machine, sat, snapshot, delay, now)
+        sticks = followed or sticks
         shaped, told = self._methods.shape(
             name, seat.setting.method, sticks, snapshot, overridden=override is not None
         )
@@ -254,6 +255,9 @@ class Driving:
         )
         if link.locked:
             decision = replace(decision, locked=link.locked)
+        if followed is not None:
+            with self._lock:
+                self._follows.allowed(name, decision.joints)
         self._fencing[name] = _Fencing(lease.token, decision.latch)
         outlet.send(decision, lease.who, lease.token)
         return decision, told

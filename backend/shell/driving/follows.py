@@ -17,6 +17,7 @@ from backend.pipeline.braking import age_of
 from backend.pipeline.records import Snapshot
 from backend.safety.limiter import Wish
 from backend.safety.limits import Delay
+from backend.spatial.types import Array
 
 MOST_LAG = 0.6
 """No machine moves when its data and commands take longer [s]."""
@@ -126,12 +127,18 @@ class Follows:
             state.pose.joints,
             lag,
             console.state is State.ENABLED,
-            dt if 0.0 < dt < 0.2 else 0.0,
+            dt if dt > 0.0 else 0.0,
             np.array([joint.continuous for joint in machine.joints]),
         )
         self._by_machine[name] = replace(found, follow=following, cycled=now)
         full = machine.max_velocity
         return Wish(np.clip(rates, -full, full), np.zeros(2))
+
+    def allowed(self, name: str, sent: Array) -> None:
+        """What the limiter left of the wish of this cycle: (n,) [rad/s]."""
+        found = self._by_machine.get(name)
+        if found is not None:
+            self._by_machine[name] = replace(found, follow=rules.allowed(found.follow, sent))
 
     def ended(self) -> list[tuple[str, Followed]]:
         """What ended since it was asked last, each once."""
