@@ -1,7 +1,7 @@
 // The panel “Trajectory” in the place of the reach image: a goal on the plan, a plan, its preview, and following it.
 
 import { deg, metres, number } from "../axis.js";
-import { controllable, holds, consoles } from "../drive/driving.js";
+import { consoles, controllable, decision, holds } from "../drive/driving.js";
 import { deadMan } from "../drive/say.js";
 import { label, machine, state } from "../state.js";
 import { $, mark, write } from "../words.js";
@@ -51,6 +51,9 @@ function word() {
   return offer ? STATES[offer.state] : "";
 }
 
+/** A direction that a concern has brought to a stand waits for neutral. */
+const stopped = () => Object.values(decision(state.own)?.causes ?? {}).some((both) => both.some((side) => side.concern === "neutral"));
+
 function result(offer) {
   const { duration, checks, clearance } = offer;
   const least = checks.min_clearance === null ? "nothing in reach" : `${metres(checks.min_clearance)} at least`;
@@ -67,6 +70,7 @@ function lines() {
     const [role, off] = Object.entries(follow.error).reduce((worst, one) => (Math.abs(one[1]) > Math.abs(worst[1]) ? one : worst), ["", 0]);
     const where = `${number(follow.at, 1)} of ${number(follow.duration, 1)} s · pace ${number(100 * follow.pace, 0)} % · error ${number(Math.abs(deg(off)), 1)}°${role ? ` ${role}` : ""}`;
     const console_ = consoles()[state.own] ?? {};
+    if (console_.state === "Enabled" && stopped()) return [where, `A limit stopped it: let go, then hold ${deadMan()} again`];
     if (console_.state === "Enabled") return [where, follow.pace > 0.02 ? "Let go to stop; a stick takes over" : "A limit holds it back, or a joint lags"];
     return [where, `${console_.why ? `${named(console_.why)}. ` : ""}Hold ${deadMan()} to follow`];
   }
