@@ -196,12 +196,17 @@ def _kept(follow: Follow, clock: float) -> tuple[tuple[float, float], ...]:
 
 
 def _where(path: Trajectory, q: Array, at: float, continuous: Array | None) -> float:
-    """The time near `at` at which the path is nearest to q (n,) [s]."""
+    """The time at which the path is nearest to q (n,), downhill from `at` [s]: where it comes back
+    to the same place later, that is not it.
+    """
     times = np.arange(max(at - RUN_ON, 0.0), min(at + RUN_ON, path.duration) + 1e-9, 0.02)
     joints = np.stack([np.interp(times, path.times, column) for column in path.joints.T], axis=1)
     off = np.abs(_apart(joints - q, continuous)).max(axis=1)
-    # Where the path stands still, many times are as near: the nearest of them.
-    return float(times[int(np.argmin(off + 1e-3 * np.abs(times - at)))])
+    k = int(np.abs(times - at).argmin())
+    for way in (1, -1):
+        while 0 <= k + way < len(off) and off[k + way] < off[k]:
+            k += way
+    return float(times[k])
 
 
 def _apart(error: Array, continuous: Array | None) -> Array:

@@ -134,6 +134,22 @@ def test_what_a_limiter_takes_from_one_joint_slows_all(left: float) -> None:
     assert np.degrees(max(gaps)) < 3.0
 
 
+def test_a_way_up_and_down_again_is_not_cut_short() -> None:
+    """The boom up by 40 degrees and down, the swing 3 degrees on: let go on the way up."""
+    times = np.linspace(0.0, 8.0, 321)
+    u = times / 8.0
+    up = 0.35 * (1.0 - np.cos(2.0 * np.pi * u))
+    boom_rate = 0.35 * 2.0 * np.pi / 8.0 * np.sin(2.0 * np.pi * u)
+    swing = 0.05 * (10 * u**3 - 15 * u**4 + 6 * u**5)
+    swing_rate = 0.05 * (30 * u**2 - 60 * u**3 + 30 * u**4) / 8.0
+    none = np.zeros_like(times)
+    q = np.stack([swing, 0.1 + up, none - 1.0, none - 0.4], axis=1)
+    path = Trajectory(times, q, np.stack([swing_rate, boom_rate, none, none], axis=1))
+    done, joints, _ = drive(path, 30.0, held=(3.2, 4.8))
+    assert done.ended == ARRIVED
+    assert max(q[1] for q in joints) > 0.1 + 0.7 - 0.03
+
+
 def test_let_go_and_pressed_again_at_once_it_goes_on() -> None:
     done, _joints, _ = drive(quick(), 20.0, held=(2.3, 2.5))
     assert done.ended == ARRIVED
