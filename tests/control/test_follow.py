@@ -148,6 +148,11 @@ def test_a_way_up_and_down_again_is_not_cut_short() -> None:
     done, joints, _ = drive(path, 30.0, held=(3.2, 4.8))
     assert done.ended == ARRIVED
     assert max(q[1] for q in joints) > 0.1 + 0.7 - 0.03
+    # Beside it, where the way down is nearer than the way up.
+    beside = path.at(3.2)[0].copy()
+    beside[0] = path.at(4.8)[0][0]
+    for moves in (True, False):
+        assert advance(Follow(path, at=3.2), beside, 0.0, moves, DT)[0].at < 3.6
 
 
 def test_let_go_and_pressed_again_at_once_it_goes_on() -> None:
