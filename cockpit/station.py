@@ -254,6 +254,7 @@ class Station:
                 # The view must outlive it; without commands every machine stands by itself.
                 self._driving_failure = f"driving stopped: {error!r}"
                 log.exception("%s", self._driving_failure)
+        self.plans.keep(snapshot)
         self._desk.recent.keep(snapshot)
         if self.people is not None:
             self.people.keep(snapshot)

@@ -13,6 +13,7 @@ from backend.documents.plan_document import (
     PlanDocument,
     PlanTaskDocument,
 )
+from backend.documents.plan_figures import figures
 from backend.documents.scene import Scene, make_scene
 from backend.errors import InputError
 from backend.fusion.crs import SiteFrame
@@ -109,6 +110,7 @@ def planned(
                 worst_acceleration=checks.worst_acceleration,
                 samples=checks.samples,
             ),
+            "figures": figures(machine, task, made, T_frame_root),
             "way": made.way,
             "notes": list(made.notes),
         }

@@ -8,8 +8,9 @@ import logging
 import math
 import threading
 import time
+from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -17,12 +18,14 @@ import numpy as np
 
 from backend.control.follow import NEAR, Trajectory
 from backend.documents.plan_document import PlanDocument
+from backend.documents.plan_figures import series
 from backend.documents.plan_live import LiveTask, kept, live_task, obstacles_of, unknown
 from backend.documents.plan_state import PlanRequest
 from backend.errors import InputError
 from backend.machine.model import Machine
 from backend.pipeline.config import Config
 from backend.pipeline.records import Snapshot
+from backend.planning.trajectory.figures import seen_motion
 from backend.shell.aside import Aside, WorkerGone
 from backend.shell.plan_worker import Answer, Look, begin
 from backend.spatial.angles import wrap
@@ -42,6 +45,13 @@ TURNED = math.radians(1.5)
 SAME = math.radians(1.0)
 """How near the end of a trajectory must be to joint values that were asked for [rad]."""
 
+LONGEST = 10_000
+"""Cycles of a followed trajectory that are kept."""
+SHOWN = 400
+"""Of these at most so many are told."""
+
+Seen = tuple[float, float, Array, Array]
+
 LIVING = ("offered", "unknown")
 
 
@@ -58,7 +68,9 @@ class Progress(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """A machine's newest. looked: when it was held against the scene last, by this clock [s]."""
+    """A machine's newest. looked: when it was held against the scene last, by this clock [s];
+    seen: of every cycle in which it was followed, the path's time, the pose's, joints and rates.
+    """
 
     name: str
     who: str
@@ -69,6 +81,7 @@ class Plan:
     answer: Answer | None = None
     looked: float = -math.inf
     text: str = ""
+    seen: deque[Seen] = field(default_factory=lambda: deque(maxlen=LONGEST))
 
 
 class PlanDesk:
@@ -166,6 +179,40 @@ class PlanDesk:
         if isinstance(found, str) or found.answer is None or found.answer.trajectory is None:
             return None
         return found.answer.document, found.live.T_site_root
+
+    def keep(self, snapshot: Snapshot) -> None:
+        """What the sensors saw of machines that follow; called in every cycle of the fast loop."""
+        for machine in self._config.own:
+            plan = self._plans.get(machine)
+            if plan is None or plan.answer is None:
+                continue
+            progress = self._followed(machine)
+            if progress is None or progress.plan != plan.name or progress.ended:
+                continue
+            pose = snapshot.machines[machine].pose
+            if np.isfinite(pose.joints).all():
+                row = progress.at, pose.time, pose.joints, pose.joint_velocities
+                plan.seen.append(row)
+
+    def followed(self, machine: str, plan: str) -> dict[str, Any]:
+        """What backend.documents.plan_figures.FollowedSeries describes. Raises InputError."""
+        found = self._of(machine, plan)
+        if isinstance(found, str):
+            raise InputError(f"{found}.")
+        described = self._config.machines[machine]
+        rows = _of_each_pose(list(found.seen))
+        at, times = (np.array([row[k] for row in rows], dtype=float) for k in (0, 1))
+        shape = len(rows), len(described.joints)
+        q, rates = (np.array([row[k] for row in rows]).reshape(shape) for k in (2, 3))
+        step = max(1, math.ceil(len(rows) / SHOWN))
+        picked = np.arange(len(rows))[::-step][::-1]
+        times -= times[:1].sum()
+        motion = seen_motion(described, found.asked.payload, times, q, rates, picked)
+        return {
+            **series(described, motion, found.live.T_site_root),
+            "at": np.round(at[picked], 3).tolist(),
+            "joints": np.round(q[picked], 5).tolist(),
+        }
 
     def close(self) -> None:
         """Give up whatever is planned, and end the process."""
@@ -299,6 +346,11 @@ class PlanDesk:
             "seconds": answer.seconds if answer else None,
             "age": self._clock() - plan.looked if math.isfinite(plan.looked) else None,
         }
+
+
+def _of_each_pose(rows: list[Seen]) -> list[Seen]:
+    """Without those that say again what the one before them said."""
+    return [b for a, b in zip([None, *rows], rows, strict=False) if a is None or a[1] < b[1]]
 
 
 def _elsewhere(T_then: Array, T_now: Array) -> str:

@@ -165,7 +165,10 @@ for (const s of figures) {
   hover.watch(s);
   PERIOD.set(s, 90);
 }
-trajectory.startTrajectory(socket.send, () => { plots.plan.dirty = true; });
+for (const s of trajectory.startTrajectory(socket.send, () => { plots.plan.dirty = true; })) {
+  hover.watch(s);
+  PERIOD.set(s, 90);
+}
 drive.startDriving(socket.send);
 
 function onFrame(header, arrays) {

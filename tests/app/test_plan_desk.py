@@ -16,6 +16,7 @@ from fastapi import FastAPI
 
 from backend.control.follow import ARRIVED, Trajectory
 from backend.documents.plan_document import PlanDocument
+from backend.documents.plan_figures import FollowedSeries
 from backend.documents.plan_live import kept, live_task
 from backend.documents.plan_state import PlanRequest, PlanStateDocument
 from backend.errors import InputError
@@ -34,6 +35,7 @@ from backend.safety.partner import Limits
 from backend.safety.people import Watch
 from backend.shell.app.plan_api import plan_router
 from backend.shell.app.server import WebServer, bind
+from backend.shell.app.wire import dumps
 from backend.shell.plan_desk import PlanDesk, Progress
 from backend.site.named_bodies import NO_SITE_BODIES
 from backend.site.site import load_site
@@ -286,6 +288,36 @@ def test_arrived_it_is_done(live: Live) -> None:
     live.progress = Progress(found["plan"], found["duration"], ARRIVED, arrived=True)
     live.until("done")
     assert isinstance(live.desk.offered("a", found["plan"]), str)
+
+
+def test_what_was_seen_while_it_was_followed_is_told(live: Live) -> None:
+    found = live.plan()
+    name, made = found["plan"], live.desk.offered("a", found["plan"])
+    assert isinstance(made, Trajectory)
+    figures = PlanDocument.model_validate_json(live.desk.text("a", name)).figures
+    assert figures is not None
+    np.testing.assert_allclose(figures.planned.swing, made.rates[:, 0], atol=1e-4)
+    np.testing.assert_allclose(figures.initial.end_point[-1], found["goal"], atol=1e-3)
+    empty = live.desk.followed("a", name)
+    assert empty["at"] == []
+    FollowedSeries.model_validate(empty)
+    for k in range(1000):
+        at = min(0.02 * k, made.duration)
+        now = state("a", (0.0, 0.0), q=made.at(at)[0])
+        pose = dataclasses.replace(now.pose, time=100.0 + 0.02 * (k // 2))  # each told twice
+        live.progress = Progress(name, at, "", arrived=False)
+        live.desk.keep(scene(a=dataclasses.replace(now, pose=pose)))
+    live.progress = Progress(name, made.duration, ARRIVED, arrived=True)
+    live.desk.keep(scene())  # after its end it does not count
+    told = FollowedSeries.model_validate_json(dumps(live.desk.followed("a", name)))
+    assert 100 < len(told.at) <= 400
+    assert told.at[-1] == pytest.approx(made.duration, abs=0.05)
+    assert told.time[-1] == pytest.approx(9.98, abs=0.05)
+    wanted = [made.at(at)[0] for at in told.at]
+    np.testing.assert_allclose(told.joints, wanted, atol=2e-3)
+    assert any(value is not None for value in told.lift)
+    with pytest.raises(InputError, match="not on offer"):
+        live.desk.followed("a", "a-0")
 
 
 def test_followed_no_other_is_planned_until_it_is_dropped(live: Live) -> None:

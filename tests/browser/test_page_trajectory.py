@@ -16,25 +16,56 @@ from playwright.sync_api import Browser, Route
 from test_page_exact import CLIPPED, OUTSIDE, SIZES
 
 from backend.documents.plan_document import PlanDocument
+from backend.documents.plan_figures import FollowedSeries, PlanFigures
 from backend.documents.plan_state import PlanOffer, PlanRequest, PlanStateDocument
 from backend.shell.app.driving_models import FollowModel
+from backend.spatial.types import Array
 
 GOAL = (-1.5, 2.0)
 TIMES = np.linspace(0.0, 6.0, 121)
 
 
-def document() -> PlanDocument:
-    """Around the machine at 2.5 m, from ahead to the goal."""
+def document_points() -> Array:
+    """Around the machine, from ahead to the goal."""
     u = TIMES / 6.0
     theta = math.radians(30) + u * (math.atan2(GOAL[1], GOAL[0]) - math.radians(30))
     reach = 3.2 + u * (math.hypot(*GOAL) - 3.2)
-    points = np.stack([reach * np.cos(theta), reach * np.sin(theta), 0.4 + u], axis=1)
+    return np.stack([reach * np.cos(theta), reach * np.sin(theta), 0.4 + u], axis=1)
+
+
+def document() -> PlanDocument:
+    u = TIMES / 6.0
+    theta = math.radians(30) + u * (math.atan2(GOAL[1], GOAL[0]) - math.radians(30))
     q = np.tile([Q[role] for role in ("swing", "boom", "stick", "bucket")], (121, 1))
     q[:, 0] = theta
     return PlanDocument(
         ok=True, machine="left", method="toppra", duration=6.0, time=TIMES.tolist(),
-        roles=["swing", "boom", "stick", "bucket"], joints=q.tolist(), end_point=points.tolist(),
+        roles=["swing", "boom", "stick", "bucket"], joints=q.tolist(),
+        end_point=document_points().tolist(),
+        figures=PlanFigures.model_validate(
+            {"initial": motion(1.5, 0.7), "planned": motion(1.0, 0.4)}
+        ),
     )  # fmt: skip
+
+
+def motion(stretch: float, swing: float) -> dict[str, Any]:
+    """Bell-shaped, `stretch` times as fast; the limits are 0.5 rad/s and 0.8 m/s^2."""
+    u, count = TIMES / 6.0, len(TIMES)
+    return {
+        "time": (TIMES / stretch).tolist(),
+        "end_point": document_points().tolist(),
+        "swing": (swing * np.sin(np.pi * u)).tolist(),
+        "critical_swing": [0.5] * count,
+        "lift": (0.3 * stretch * np.sin(2 * np.pi * u)).tolist(),
+        "critical_lift": [0.8 if k > 20 else None for k in range(count)],
+    }
+
+
+def followed() -> str:
+    """The first 2.4 s."""
+    series = {k: v[:49] for k, v in motion(1.0, 0.38).items()}
+    joints = (np.array(document().joints)[:49] - 0.02).tolist()
+    return FollowedSeries(**series, at=TIMES[:49].tolist(), joints=joints).model_dump_json()
 
 
 def offer(state: str = "offered", **changes: Any) -> dict[str, Any]:
@@ -82,6 +113,10 @@ class TrajectoryFeed(DriveFeed):
     def more_routes(self) -> None:
         super().more_routes()
         self.page.route("**/api/plan", self.reply)
+        self.page.route(
+            "**/api/plan/left/left-1/followed",
+            lambda route: route.fulfill(content_type="application/json", body=followed()),
+        )
         self.page.route("**/api/plan/left", self.reply)
         self.page.route(
             "**/api/plan/left/left-1",
@@ -197,6 +232,17 @@ def test_from_a_click_to_the_goal(browser: Browser, size: tuple[int, int], artif
     )
     feed.send(lambda: feed.of("plan")[-1]["at"] == 3 and feed.of("plan")[-1]["rate"] == 0)
     feed.send(lambda: feed.drawn()["at"] == pytest.approx(document().end_point[60]))
+    feed.send(lambda: feed.shown("tj-plot-swing").get("time") == 3)
+    swing, lift = feed.shown("tj-plot-swing"), feed.shown("tj-plot-lift")
+    assert (swing["most"], swing["limit"]) == (
+        pytest.approx(math.degrees(0.4)),
+        pytest.approx(math.degrees(0.5)),
+    )
+    assert swing["over"]  # the simple one would have tipped, the planned one does not
+    assert swing["within"]
+    assert (lift["limit"], lift["over"], lift["actual"]) == (0.8, False, 0)
+    assert feed.shown("tj-plot-joints")["plan"] == "left-1"
+    assert feed.drawn()["simple"] == 121
     feed.page.screenshot(path=artifacts / f"trajectory-preview-{size[0]}x{size[1]}.png")
     no_overflow(feed, size)
 
@@ -220,6 +266,12 @@ def test_from_a_click_to_the_goal(browser: Browser, size: tuple[int, int], artif
     assert "error 0.8° swing" in feed.words()
     assert feed.page.is_disabled("#tj-plan")
     feed.send(lambda: feed.drawn()["at"] == pytest.approx(document().end_point[48]))
+    feed.send(lambda: feed.shown("tj-plot-swing")["actual"] == 49)
+    assert feed.shown("tj-plot-lift")["time"] == 2.4
+    assert feed.shown("tj-plot-joints")["actual"] == 49
+    feed.page.mouse.move(*feed.at("tj-plot-swing", 0.3, 0.4))
+    feed.send(lambda: "actual" in feed.page.inner_text("#hover"))
+    assert "Ω_c 28.65 °/s" in feed.page.inner_text("#hover")
     feed.page.screenshot(path=artifacts / f"trajectory-following-{size[0]}x{size[1]}.png")
     no_overflow(feed, size)
     feed.follow(pace=0.0)

@@ -7,6 +7,7 @@ from typing import Any, Protocol
 from fastapi import APIRouter, Request, Response
 
 from backend.documents.plan_document import PlanDocument
+from backend.documents.plan_figures import FollowedSeries
 from backend.documents.plan_state import PlanRequest, PlanStateDocument
 from backend.errors import InputError
 from backend.shell.app.answers import refused, who
@@ -14,13 +15,17 @@ from backend.shell.app.wire import dumps
 
 
 class Plans(Protocol):
-    """What the API asks. All are called in worker threads; `start` and `text` raise InputError."""
+    """What the API asks. All are called in worker threads; all but `document` and `drop` may raise
+    InputError.
+    """
 
     def document(self) -> dict[str, Any]: ...
 
     def start(self, asked: PlanRequest, who: str) -> str: ...
 
     def drop(self, machine: str, who: str) -> None: ...
+
+    def followed(self, machine: str, plan: str) -> dict[str, Any]: ...
 
     def text(self, machine: str, plan: str) -> str: ...
 
@@ -58,6 +63,14 @@ def plan_router(plans: Plans) -> APIRouter:
         """All of a plan: joints, rates, accelerations, end points (site frame) over time."""
         try:
             return Response(plans.text(machine, plan), media_type="application/json")
+        except InputError as error:
+            return refused(error, 404)
+
+    @router.get("/{machine}/{plan}/followed", responses={200: {"model": FollowedSeries}})
+    def followed(machine: str, plan: str) -> Response:
+        """What the sensors saw while it was followed; empty before."""
+        try:
+            return Response(dumps(plans.followed(machine, plan)), media_type="application/json")
         except InputError as error:
             return refused(error, 404)
 

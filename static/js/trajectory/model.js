@@ -6,6 +6,7 @@ import { described, machine, replaying, state } from "../state.js";
 import { page } from "../scene.js";
 
 const TOLD = 500; // between two words to the 3D scene, which forgets after some seconds [ms]
+const SEEN = 400; // between two questions for what the sensors saw [ms]
 const LATER = 1000; // before a plan that could not be fetched is asked for again [ms]
 
 let send = () => {};
@@ -15,6 +16,8 @@ let acting = false, fetching = "", failed = -Infinity;
 let fetched = null; // {plan, document}
 let play = null; // {plan, at, since, rate}
 let said = -Infinity, sent = false;
+let actual = null; // {plan, series}
+let asked = -Infinity, asking = false, serial = 0;
 
 /** There is a server that plans. */
 export const possible = () => !replaying() && Boolean(state.snapshot?.plans);
@@ -120,6 +123,24 @@ function tell() {
   sent = shown();
 }
 
+/** What the sensors saw while it was followed, a FollowedSeries; null before. */
+export const seen = () => (actual && actual.plan === offer()?.plan && actual.series.at.length ? actual.series : null);
+
+async function fetchSeen({ plan: name }) {
+  asked = performance.now();
+  asking = true;
+  try {
+    actual = { plan: name, series: await get(`/api/plan/${encodeURIComponent(state.own)}/${encodeURIComponent(name)}/followed`) };
+    serial += 1;
+  } catch {
+    // dropped meanwhile
+  }
+  asking = false;
+}
+
+/** Counts whatever changes the plots but the moment. */
+export const changes = () => serial;
+
 async function fetchIt({ plan: name }) {
   fetching = name;
   try {
@@ -130,6 +151,7 @@ async function fetchIt({ plan: name }) {
     failed = performance.now(); // dropped meanwhile, or the link is slow: once more
   }
   fetching = "";
+  serial += 1;
 }
 
 export function startModel(give) {
@@ -140,6 +162,11 @@ export function startModel(give) {
 export function update(open) {
   const now = offer();
   if (now && now.duration !== null && fetched?.plan !== now.plan && !fetching && open && performance.now() - failed > LATER) fetchIt(now);
+  const mine = follow();
+  if (open && document() && mine?.plan === now.plan && !asking && performance.now() - asked >= SEEN && (!mine.ended || actual?.plan !== now.plan || actual.whole !== mine.ended)) {
+    const { ended } = mine;
+    fetchSeen(now).then(() => { if (actual) actual.whole = ended; });
+  }
   if (following() && play) play = null; // the machine itself shows it now
   if (!open && play) play = null;
   if ((shown() || sent) && (performance.now() - said >= TOLD || shown() !== sent)) tell();

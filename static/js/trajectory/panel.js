@@ -1,18 +1,20 @@
 // The panel “Trajectory” in the place of the reach image: a goal on the plan, a plan, its preview, and following it.
 
-import { deg, metres, number } from "../axis.js";
+import { deg, metres, number, seconds } from "../axis.js";
 import { consoles, controllable, decision, holds } from "../drive/driving.js";
 import { deadMan } from "../drive/say.js";
 import { label, machine, state } from "../state.js";
 import { $, mark, write } from "../words.js";
 import { setHeight, setOpen, startDrawing } from "./draw.js";
 import * as model from "./model.js";
+import { surfaces } from "./plots.js";
 
 const FIELDS = { height: [0.5, -20, 40], payload: [0, 0, 1e6], lift: [0, 0, 20], clearance: [0.2, 0.05, 4], speed: [100, 1, 100], acceleration: [100, 1, 100] };
 const STATES = { planning: "PLANNING", none: "NO WAY", offered: "READY", unknown: "UNKNOWN", void: "VOID", done: "ARRIVED" };
 
 let open = false;
 let redraw = () => {};
+let plots = [];
 let drawn = "";
 let used = false;
 
@@ -118,9 +120,13 @@ export function closeTrajectory() {
   redraw();
 }
 
-/** plan: draws the plan view anew. */
+/** plan: draws the plan view anew. Returns the surfaces of its plots. */
 export function startTrajectory(send, plan) {
-  redraw = plan;
+  plots = surfaces();
+  redraw = () => {
+    plan();
+    for (const one of plots) one.dirty = true;
+  };
   model.startModel(send);
   startDrawing(() => {
     update();
@@ -145,6 +151,7 @@ export function startTrajectory(send, plan) {
       else if (event.key === "Escape") keys();
     });
   }
+  return plots;
 }
 
 /** Ten times a second. */
@@ -155,6 +162,7 @@ export function update() {
   model.update(open);
   $("trajectory-open").setAttribute("aria-pressed", String(open));
   $("trajectory").hidden = !open;
+  $("tj-plots").hidden = !open || !model.document()?.ok;
   mark(document.body, "trajectory", open ? 1 : 0);
   if (!open) return undefined;
   const offer = model.offer(), picked = model.picked(), asked = entered();
@@ -174,6 +182,9 @@ export function update() {
   write($("tj-more"), others.join(" · "));
   $("tj-more").title = others.join(" · ");
   const known = model.document()?.ok === true;
+  write($("tj-plan-name"), offer?.plan ?? "");
+  const watched = ["offered", "unknown"].includes(offer?.state) && Number.isFinite(offer.age);
+  for (const node of $("tj-plots").querySelectorAll(".age")) write(node, watched ? seconds(offer.age) : "");
   setDisabled("tj-pause", !known || model.following());
   setDisabled("tj-time", !known || model.following());
   write($("tj-pause"), model.playing() ? "Pause" : "Play");
@@ -181,7 +192,7 @@ export function update() {
   if (known) $("tj-time").max = model.duration();
   if (document.activeElement !== $("tj-time") || model.playing()) $("tj-time").value = at;
   write($("tj-at"), known ? `${number(at, 1)} s` : "");
-  const key = `${offer?.plan} ${offer?.state} ${at.toFixed(2)} ${picked} ${asked.height} ${known}`;
+  const key = `${offer?.plan} ${offer?.state} ${at.toFixed(2)} ${picked} ${asked.height} ${known} ${model.changes()}`;
   if (key !== drawn) redraw();
   drawn = key;
   return undefined;
