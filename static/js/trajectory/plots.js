@@ -10,7 +10,7 @@ import * as model from "./model.js";
 
 const SIMPLE = [C.second, 1.5, [2, 3]], PLANNED = ["#FFFFFF", 2, null], LIMIT = [C.tipOver, 2, [8, 4]], ACTUAL = [C.remote, 3, null];
 const INKS = ["#D2C394", "#9FB9CC", "#BFB0CF", "#A9C4AC", "#CDAFA3", "#E6EAED"];
-const HIGHEST = { swing: 2.5, lift: 3 }; // times the largest value of the curves: where a limit is farther up it is not drawn
+const HIGHEST = { swing: 2.5, lift: 3 }; // times the largest value of the curves: where a limit is farther up it is told and not drawn
 
 const KINDS = {
   swing: { title: "swing rate, °/s", unit: "°/s", of: (s) => s.swing.map((v) => deg(Math.abs(v))), limit: (s) => s.critical_swing.map((v) => (v === null ? NaN : deg(v))), name: "Ω_c" },
@@ -61,8 +61,11 @@ function limited(kind) {
     const limits = limit(planned), known = finite(limits).length > 0;
     const most = Math.max(0.1, ...finite(first), ...finite(ours), ...finite(measured));
     const least = Math.min(0, ...finite(first), ...finite(ours), ...finite(measured));
-    const high = Math.max(most, Math.min(HIGHEST[kind] * most, ...finite(limits)));
-    const list = [[swatches.line(...swap(PLANNED)), "plan"], [swatches.line(...swap(LIMIT)), known ? name : `${name} none`], [swatches.line(...swap(SIMPLE)), "simple"], ...(measured.length ? [[swatches.line(...swap(ACTUAL)), "actual"]] : [])];
+    const lowest = Math.min(...finite(limits));
+    const near = known && lowest <= HIGHEST[kind] * most;
+    const high = near ? Math.max(most, Math.min(HIGHEST[kind] * most, Math.max(...finite(limits)))) : most;
+    const told = !known ? `${name} none` : near ? name : `${name} ≥ ${number(lowest, kind === "lift" ? 1 : 0)}`;
+    const list = [[swatches.line(...swap(PLANNED)), "plan"], [swatches.line(...swap(LIMIT)), told], [swatches.line(...swap(SIMPLE)), "simple"], ...(measured.length ? [[swatches.line(...swap(ACTUAL)), "actual"]] : [])];
     const rows = entries(g, width, height, list);
     const chart = (charts[kind] = plot(g, width, height, rows, upward(least, high, height < 150 ? 3 : 5), title, unit, Math.max(document.duration, initial.time[initial.time.length - 1])));
     const draw = (times, values, [colour, wide, dash]) => curve(g, chart, points(chart, times, values), colour, wide, dash);
@@ -73,7 +76,7 @@ function limited(kind) {
     now(g, chart);
     const over = exceeds(first, limit(initial));
     if (over) label(g, `simple: over ${name}`, chart.box.right - 3, chart.box.top + 2, { align: "right", base: "top", halo: true });
-    return { state: { kind, plan: model.offer()?.plan, time: Math.round(moment() * 100) / 100, actual: measured.length, limit: known ? Math.min(...finite(limits)) : null, most: Math.max(...finite(ours), 0), over, within: !exceeds(ours, limits) }, age: 0, label: `${title}: planned at most ${number(Math.max(...finite(ours), 0), 1)}, limit ${known ? `at least ${number(Math.min(...finite(limits)), 1)}` : "none"} ${unit}` };
+    return { state: { kind, plan: model.offer()?.plan, time: Math.round(moment() * 100) / 100, actual: measured.length, limit: known ? lowest : null, most: Math.max(...finite(ours), 0), over, within: !exceeds(ours, limits) }, age: 0, label: `${title}: planned at most ${number(Math.max(...finite(ours), 0), 1)}, limit ${known ? `at least ${number(lowest, 1)}` : "none"} ${unit}` };
   };
 }
 
