@@ -174,7 +174,8 @@ class Desk:
 
     view: the 3D scene's, None while it starts; action: told what an operator did, on which
     page, with what details; ready: whether what judges postures is loaded; played: a run by the
-    names of use case and method, None where there is none.
+    names of use case and method, previewed: one by those of machine and plan, None where there is
+    none.
     """
 
     def __init__(
@@ -185,13 +186,14 @@ class Desk:
         action: Callable[[str, str | None, dict[str, Any]], None] = lambda *_: None,
         ready: Callable[[], bool] = lambda: True,
         played: Callable[[str, str], Played | None] = lambda *_: None,
+        previewed: Callable[[str, str], Played | None] = lambda *_: None,
     ) -> None:
         self._config = config
         self._hub = hub
         self._view = view
         self._action = action
         self._ready = ready
-        self._played = played
+        self._played, self._previewed = played, previewed
         self._tip_heights: dict[str, float] = {}
         self.recent = Recent()
 
@@ -235,9 +237,9 @@ class Desk:
                 with contextlib.suppress(ValueError):
                     view.set_stages(shown, page)
             return
-        if kind == "use_case":  # likewise
+        if kind in ("use_case", "plan"):  # likewise
             if view is not None:
-                self._show_use_case(view, message, page)
+                self._show_run(view, message, page)
             return
         if isinstance(kind, str):
             self._action(kind, page, message)
@@ -285,11 +287,14 @@ class Desk:
             touched = touches(snapshot, self._config, machine, q)
         view.set_ghost(machine, joints, page, touched)
 
-    def _show_use_case(self, view: View, message: dict[str, Any], page: str | None) -> None:
-        """A run of a use case from one of its moments on; none takes the ghost away."""
-        name, method = message.get("name"), message.get("method")
+    def _show_run(self, view: View, message: dict[str, Any], page: str | None) -> None:
+        """A use case or a plan from one of its moments on; none takes the ghost away."""
+        if message["type"] == "plan":
+            find, named = self._previewed, (message.get("machine"), message.get("plan"))
+        else:
+            find, named = self._played, (message.get("name"), message.get("method"))
         at, rate = message.get("at", 0.0), message.get("rate", 0.0)
-        run = self._played(name, method) if _is_text(name) and _is_text(method) else None
+        run = find(*named) if all(map(_is_text, named)) else None
         if all(isinstance(v, int | float) and math.isfinite(v) for v in (at, rate)):
             with contextlib.suppress(ValueError):
                 view.set_use_case(run, float(at), float(rate), page)

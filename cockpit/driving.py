@@ -9,6 +9,7 @@ from typing import Any
 from backend.control.lease import TERM, Answer, Request
 from backend.pipeline.config import Config
 from backend.shell.driving.driving import Driving, Event
+from backend.shell.driving.follows import Plans
 from backend.shell.driving.leases import Leases
 from backend.shell.driving.methods import Methods
 from backend.shell.driving.outlet import Outlet
@@ -20,9 +21,9 @@ from backend.site.site import Site
 
 
 def make_driving(
-    site: Site, config: Config, session: Any, receiver: Receiver, event: Event
+    site: Site, config: Config, session: Any, receiver: Receiver, event: Event, plans: Plans
 ) -> Driving:
-    """For the machines that this cockpit answers for. event: see backend.shell.driving."""
+    """For the machines that this cockpit answers for. event, plans: see backend.shell.driving."""
     prefixes = {machine.name: machine.prefix for machine in site.machines}
     machines = {name: config.machines[name] for name in config.own}
     outlets = {
@@ -45,4 +46,5 @@ def make_driving(
         ask(session, "lease", prefixes[name], encode_request(request), on_answer, on_end, TERM)
 
     leases = Leases(asking, time.monotonic)
-    return Driving(machines, outlets, leases, receiver.statuses, Methods(config), event)
+    methods = Methods(config)
+    return Driving(machines, outlets, leases, receiver.statuses, methods, event, plans=plans)

@@ -24,6 +24,8 @@ from backend.documents.gauge import GaugeDocument
 from backend.documents.gauge_choice import GaugeChoiceFile, GaugeStateDocument
 from backend.documents.people import PeopleModel
 from backend.documents.plan_document import PlanDocument, PlanTaskDocument
+from backend.documents.plan_figures import FollowedSeries
+from backend.documents.plan_state import PlanRequest, PlanStateDocument
 from backend.documents.recordings import RecordingsDocument, RecoverDocument
 from backend.documents.session import DiffDocument, SeriesDocument, SessionDocument
 from backend.documents.stability import StabilityModel
@@ -46,6 +48,9 @@ SCHEMAS: dict[str, tuple[type[BaseModel], str]] = {
     "stages": (StagesDocument, "/api/stages: what detection makes of the newest scan"),
     "plan-task": (PlanTaskDocument, "the task that plan reads"),
     "plan": (PlanDocument, "what plan --json prints"),
+    "plan-followed": (FollowedSeries, "/api/plan/MACHINE/PLAN/followed"),
+    "plan-request": (PlanRequest, "what is posted to /api/plan"),
+    "plan-state": (PlanStateDocument, "/api/plan, and the key plans of a snapshot"),
     "along": (AlongDocument, "what along --json prints"),
     "use-case": (UseCaseDocument, "what use-case --json prints"),
     "use-case-state": (UseCaseStateDocument, "/api/use-case"),
@@ -80,7 +85,7 @@ def print_schema(name: str) -> None:
     """Prints one schema, or the names when `name` is empty."""
     if not name:
         for known, (_, what) in SCHEMAS.items():
-            print(f"{known:12} {what}")
+            print(f"{known:13} {what}")
         return
     if name not in SCHEMAS:
         raise InputError(f'schema: there is no "{name}"; allowed are {", ".join(SCHEMAS)}.')

@@ -25,6 +25,7 @@ from backend.shell.app.cameras import camera_router
 from backend.shell.app.feed import Frames
 from backend.shell.app.gauge_api import gauge_router
 from backend.shell.app.metrics import metrics_router
+from backend.shell.app.plan_api import plan_router
 from backend.shell.app.server import WebServer, bind
 from backend.shell.app.stages import stages_router
 from backend.shell.app.use_case_api import use_case_router
@@ -36,6 +37,7 @@ from backend.shell.link.receiver import Receiver
 from backend.shell.link.relay import Relay
 from backend.shell.link.session import open_session
 from backend.shell.link.source import LinkSource
+from backend.shell.plan_desk import PlanDesk, Progress
 from backend.shell.runner import Runner
 from backend.shell.session.recorder import Recorder
 from backend.shell.use_case_desk import UseCaseDesk
@@ -46,6 +48,7 @@ from cockpit.desk import Desk, along_loops, image_loops, load_models, make_confi
 from cockpit.driving import make_driving
 from cockpit.options import Options
 from cockpit.people import make_people
+from cockpit.plan_scene import PlanScene
 from cockpit.recording import make_recorder, recording_sources, site_folder
 from cockpit.resolutions import resolutions
 from cockpit.use_case_scene import UseCaseScene
@@ -108,12 +111,15 @@ class Station:
         found = offers(site, self.config.site)
         self.use_cases = UseCaseDesk(found, self.config.labels, self._event)
         self._closing.callback(self.use_cases.close)
+        self.plans = PlanDesk(self.config, self.hub.latest, self._followed, self._event)
+        self._closing.callback(self.plans.close)
         self._desk = Desk(
             self.config,
             self.hub,
             lambda: self.view,
             self.recorder.action,
             played=UseCaseScene(self.use_cases).played,
+            previewed=PlanScene(self.plans).played,
         )
         kept = state_folder() / "gauge" / f"{site.name}.json"
         self.gauge = GaugeDesk(self.config, self.hub, kept, self._event)
@@ -125,7 +131,9 @@ class Station:
         )
         self._closing.callback(self.receiver.close)
         self.people = make_people(self.config, self.receiver)
-        self.driving = make_driving(site, self.config, session, self.receiver, self._event)
+        self.driving = make_driving(
+            site, self.config, session, self.receiver, self._event, self.plans
+        )
         self._closing.callback(self.driving.shut)
         self.runner = Runner(
             self.config,
@@ -175,6 +183,7 @@ class Station:
                 camera_router(make_cameras(site, session)),
                 gauge_router(self.gauge),
                 use_case_router(self.use_cases),
+                plan_router(self.plans),
                 *(() if self.people is None else (stages_router(self.people.look),)),
             ),
             access=access,
@@ -212,6 +221,7 @@ class Station:
         document["backend"] = self.backend()
         document["recording"] = vars(self.recorder.state())
         document["driving"] = self.driving.document()
+        document["plans"] = self.plans.document()
         if self._demo_began is not None:
             document["demo"] = {"elapsed": time.time() - self._demo_began()}
         return document
@@ -244,6 +254,7 @@ class Station:
                 # The view must outlive it; without commands every machine stands by itself.
                 self._driving_failure = f"driving stopped: {error!r}"
                 log.exception("%s", self._driving_failure)
+        self.plans.keep(snapshot)
         self._desk.recent.keep(snapshot)
         if self.people is not None:
             self.people.keep(snapshot)
@@ -259,6 +270,13 @@ class Station:
 
     def _staged(self) -> StagedScan | None:
         return None if self.people is None else self.people.look().stages
+
+    def _followed(self, machine: str) -> Progress | None:
+        found = self.driving.followed(machine)
+        if found is None:
+            return None
+        follow = found.follow
+        return Progress(found.plan, follow.at, follow.ended, follow.arrived)
 
     def _event(self, what: str, who: str, details: dict[str, Any]) -> None:
         """What an operator did with a machine, for the recording and the audit log."""

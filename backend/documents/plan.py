@@ -13,6 +13,7 @@ from backend.documents.plan_document import (
     PlanDocument,
     PlanTaskDocument,
 )
+from backend.documents.plan_figures import figures
 from backend.documents.scene import Scene, make_scene
 from backend.errors import InputError
 from backend.fusion.crs import SiteFrame
@@ -58,16 +59,30 @@ def plan_document(
     task = _task(asked, scene, where)
     around = scene.around(asked.machine)
     obstacles = Obstacles(around.boxes, around.names, asked.ground)
+    T = body.link_poses[0].copy()
+    T[:3, 3] += scene.origin
+    return planned(asked.machine, machine, task, obstacles, T, method)[0]
+
+
+def planned(
+    name: str,
+    machine: Machine,
+    task: Task,
+    obstacles: Obstacles,
+    T_frame_root: Array,
+    method: Method = "toppra",
+) -> tuple[PlanDocument, Trajectory | None]:
+    """A task planned, as a document and as what can be followed.
+
+    name: of the machine; T_frame_root: (4, 4) to the frame in which end points are told.
+    """
     made = plan(machine, task, obstacles, method)
     document = PlanDocument(
-        ok=isinstance(made, Trajectory),
-        machine=asked.machine,
-        method=method,
-        clearance=task.clearance,
+        ok=isinstance(made, Trajectory), machine=name, method=method, clearance=task.clearance
     )
     if isinstance(made, Refusal):
         made = proven(machine, task, obstacles, made)
-        return document.model_copy(
+        refused = document.model_copy(
             update={
                 "why": made.why,
                 "kind": made.kind,
@@ -75,9 +90,10 @@ def plan_document(
                 "proven": made.proven,
             }
         )
-    points = end_point(machine, made.q, body.link_poses[0]) + scene.origin
+        return refused, None
+    points = end_point(machine, made.q, T_frame_root)
     checks = made.checks
-    return document.model_copy(
+    found = document.model_copy(
         update={
             "duration": made.duration,
             "time": made.time.tolist(),
@@ -94,10 +110,12 @@ def plan_document(
                 worst_acceleration=checks.worst_acceleration,
                 samples=checks.samples,
             ),
+            "figures": figures(machine, task, made, T_frame_root),
             "way": made.way,
             "notes": list(made.notes),
         }
     )
+    return found, made
 
 
 def proven(
@@ -168,14 +186,15 @@ def _task(asked: PlanTaskDocument, scene: Scene, where: str) -> Task:
         clearance=asked.clearance + scene.eta(name),
         lift=asked.lift,
         share=asked.stability_share,
-        speeds=_by_role(machine, limits, "joint_velocities", where),
-        accelerations=_by_role(machine, limits, "joint_accelerations", where),
-        cylindrical=_cylindrical(limits.cylindrical),
+        speeds=by_role(machine, limits, "joint_velocities", where),
+        accelerations=by_role(machine, limits, "joint_accelerations", where),
+        cylindrical=cylindrical(limits.cylindrical),
         T_site_root=T_site_root,
     )
 
 
-def _by_role(machine: Machine, limits: LimitsDocument, which: str, where: str) -> Array:
+def by_role(machine: Machine, limits: LimitsDocument, which: str, where: str) -> Array:
+    """(n,) of the limits called `which`, infinite where none is given. Raises InputError."""
     roles = [joint.role for joint in machine.joints]
     values = np.full(len(roles), np.inf)
     for role, value in getattr(limits, which).items():
@@ -188,7 +207,9 @@ def _by_role(machine: Machine, limits: LimitsDocument, which: str, where: str) -
     return values
 
 
-def _cylindrical(given: CylindricalLimits) -> Cylindrical:
+def cylindrical(given: CylindricalLimits) -> Cylindrical:
+    """The same limits as arrays, infinite where none is given."""
+
     def three(what: str) -> Array:
         values = [getattr(given, f"{axis}_{what}") for axis in ("theta", "r", "z")]
         return np.array([np.inf if v is None else v for v in values])

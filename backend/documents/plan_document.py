@@ -6,6 +6,7 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, Field, ValidationError, model_validator
 
+from backend.documents.plan_figures import PlanFigures
 from backend.documents.state import (
     NotNegative,
     Number,
@@ -125,6 +126,7 @@ class PlanDocument(BaseModel):
         None, description="asked for, and what the state's sigma adds [m]"
     )
     checks: PlanChecks | None = None
+    figures: PlanFigures | None = Field(None, description="swing and lift with their limits")
     way: str | None = Field(None, description="how it was found")
     notes: list[str] = Field(default_factory=list, description="what was not judged, or changed")
 

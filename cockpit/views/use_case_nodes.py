@@ -1,7 +1,7 @@
-"""A use case of the working gauge as it plays: a ghost where it begins, its deciding pair, and the
-tool's path, as it went and as it was meant.
+"""A run as it plays: a ghost where it begins, its deciding pair where one is known, and the tool's
+path, as it went and as it was meant. Use cases of the working gauge are runs, and plans are.
 
-It says "USE CASE · simulated", and is drawn with the colours of ghosts: no alarm looks like it.
+Its title says what it is, and it is drawn with the colours of ghosts: no alarm looks like it.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class Played:
     """A run as it is drawn. machine: of the site; T_site_root: (4, 4) where it stands; words: of
     the method; times: (m,) [s]; q: (m, n) [rad]; distance: (m,) of the deciding pair [m]; pair:
     (m,) index into pairs, in words; points: (m, 2, 3) of it; tool, designed: (m, 3) where the tool
-    was and was meant to be; all in the machine's root frame [m].
+    was and was meant to be; all in the machine's root frame [m]. Without pairs no pair is drawn.
     """
 
     machine: str
@@ -49,6 +49,7 @@ class Played:
     points: Array
     tool: Array
     designed: Array
+    title: str = TITLE
 
     def instant(self, t: float) -> int:
         """The last instant not after t [s]; the first, the last where t is outside."""
@@ -110,12 +111,19 @@ class UseCaseNodes:
         if (key := (run, k, on_it)) == self._drawn:
             return
         if self._drawn is None or self._drawn[0] is not run:
+            self._line.draw(np.zeros((0, 2, 3), dtype=np.float32), ink(palette.TEXT))
+            self._label.visible = False
             self._path.draw(_way(run.tool, run.T_site_root), ink(palette.TEXT))
             self._meant.draw(_way(run.designed, run.T_site_root), ink(palette.STALE))
         self._drawn = key
         fixed = np.arange(len(poses)) == 0
-        words = f"{TITLE} · {run.words}"
-        self._ghost.stand(poses, fixed & on_it, words, bool(run.distance[k] < 0.0))
+        words = f"{run.title} · {run.words}"
+        touches = bool(run.pairs) and bool(run.distance[k] < 0.0)
+        self._ghost.stand(poses, fixed & on_it, words, touches)
+        if run.pairs:
+            self._draw_pair(run, k)
+
+    def _draw_pair(self, run: Played, k: int) -> None:
         points = _moved(run.points[k], run.T_site_root)
         self._line.draw(points[None].astype(np.float32), ink(palette.TEXT))
         self._label.position = points.mean(axis=0) - [0.0, 0.0, DROP]

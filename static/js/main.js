@@ -40,6 +40,7 @@ import { sessionKey } from "./keys.js";
 import * as drive from "./drive/start.js";
 import * as gauge from "./gauge/panel.js";
 import * as useCases from "./use_cases/panel.js";
+import * as trajectory from "./trajectory/panel.js";
 
 readSizes();
 
@@ -108,6 +109,7 @@ function onKey(event) {
     drive.closeDialogs();
     gauge.closeGauge();
     useCases.closeUseCases();
+    trajectory.closeTrajectory();
     hover.hide();
     ghost.unpin();
     alarm.showList(false);
@@ -160,6 +162,10 @@ stages.startStages(socket.send);
 gauge.startGauge();
 const figures = useCases.startUseCases(socket.send, gauge.closeGauge);
 for (const s of figures) {
+  hover.watch(s);
+  PERIOD.set(s, 90);
+}
+for (const s of trajectory.startTrajectory(socket.send, () => { plots.plan.dirty = true; })) {
   hover.watch(s);
   PERIOD.set(s, 90);
 }
@@ -224,6 +230,7 @@ function tick() {
   headers.update();
   gauge.update();
   useCases.update();
+  trajectory.update();
   ghost.age();
   hover.refresh();
 }

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable
 
 import numpy as np
 import pytest
 
-from backend.control.follow import ARRIVED, LOST, Follow, Trajectory, advance
+from backend.control.follow import ARRIVED, LOST, Follow, Trajectory, advance, allowed
 from backend.errors import InputError
 from backend.machine.load import load_machine
 from backend.shell.sim.dynamics import Demand, Hydraulics, SimState, limits_of, step
@@ -16,6 +17,15 @@ from backend.spatial.types import Array
 MACHINE = load_machine("mini")
 DT = 0.02
 DEAD = 0.16  # to the machine, and back with what its sensors saw [s]
+
+
+def quick() -> Trajectory:
+    """A swing at nearly all that the machine has: it runs on by 30 degrees when it is let go."""
+    times = np.linspace(0.0, 4.6, 151)
+    u = times / times[-1]
+    s, ds = 10 * u**3 - 15 * u**4 + 6 * u**5, (30 * u**2 - 60 * u**3 + 30 * u**4) / times[-1]
+    way = np.array([2.3, 0.05, -0.05, 0.0])
+    return Trajectory(times, np.array([0.0, 0.5, -1.0, -0.4]) + s[:, None] * way, ds[:, None] * way)
 
 
 def trajectory(seconds: float = 6.0) -> Trajectory:
@@ -30,12 +40,18 @@ def trajectory(seconds: float = 6.0) -> Trajectory:
 
 
 def drive(
-    path: Trajectory, seconds: float, held: tuple[float, float] = (np.inf, np.inf), off: float = 0.0
+    path: Trajectory,
+    seconds: float,
+    held: tuple[float, float] = (np.inf, np.inf),
+    off: float = 0.0,
+    most: Callable[[float], Array] | None = None,
+    dead: float = DEAD,
 ) -> tuple[Follow, list[Array], list[float]]:
     """The dead-man is released between the two times of `held`; the machine begins `off` [rad]
-    beside. Returns the last Follow, the machine's joints and the path's time of every cycle.
+    beside; most: (n,) what a limiter leaves at a time [rad/s]. Returns the last Follow, the
+    machine's joints and the path's time of every cycle.
     """
-    limits, way = limits_of(MACHINE), round(0.5 * DEAD / DT)
+    limits, way = limits_of(MACHINE), round(0.5 * dead / DT)
     state = SimState(path.joints[0] + off, np.zeros(4), np.zeros(3), 0.0, 0.0, 0.0, np.zeros(2))
     commands = deque([np.zeros(4)] * way, maxlen=way + 1)
     seen = deque([state.q] * way, maxlen=way + 1)
@@ -43,8 +59,11 @@ def drive(
     for k in range(round(seconds / DT)):
         seen.append(state.q)
         moves = not held[0] <= k * DT < held[1]
-        follow, wish = advance(follow, seen[0], DEAD + 0.08, moves, DT)
+        follow, wish = advance(follow, seen[0], dead + 0.08, moves, DT)
         assert moves or not wish.any()
+        if most is not None:
+            wish = np.clip(wish, -most(k * DT), most(k * DT))
+            follow = allowed(follow, wish)
         commands.append(wish)
         demand = Demand(commands[0], np.zeros(2))
         state = step(state, demand, limits, Hydraulics(), DT)
@@ -82,10 +101,63 @@ def test_released_it_stands_and_goes_on_from_there() -> None:
     done, joints, times = drive(path, 15.0, held=(2.0, 5.0))
     stood = np.array(joints[round(3.5 / DT) : round(5.0 / DT)])
     assert np.ptp(stood, axis=0).max() < 1e-3
-    assert times[round(2.0 / DT)] == times[round(4.9 / DT)]
+    # The path's time is where the machine stands: from there it goes on.
+    assert np.abs(path.at(times[round(4.9 / DT)])[0] - stood[-1]).max() < np.radians(1.5)
     assert done.ended == ARRIVED
     gaps = [np.abs(path.joints - q).max(axis=1).min() for q in joints]
     assert np.degrees(max(gaps)) < 2.5
+
+
+@pytest.mark.parametrize("released", [1.2, 2.3, 3.4])
+def test_let_go_at_full_swing_it_goes_on_all_the_same(released: float) -> None:
+    path = quick()
+    done, joints, times = drive(path, 20.0, held=(released, released + 3.0))
+    assert done.ended == ARRIVED
+    stood = np.array(joints[round((released + 2.5) / DT)])
+    assert np.abs(path.at(times[round((released + 2.9) / DT)])[0] - stood).max() < np.radians(2.0)
+    assert np.degrees(np.abs(joints[-1] - path.joints[-1]).max()) < 1.0
+    gaps = [np.abs(path.joints - q).max(axis=1).min() for q in joints]
+    assert np.degrees(max(gaps)) < 3.0
+
+
+@pytest.mark.parametrize("left", [0.0, 0.05, 0.4])
+def test_what_a_limiter_takes_from_one_joint_slows_all(left: float) -> None:
+    """Suddenly, at full swing, by a slow radio: told at once it is not lost before it is seen."""
+    path = quick()
+
+    def most(t: float) -> Array:
+        return np.array([left if 2.0 < t < 4.0 else 9.0, 9.0, 9.0, 9.0])
+
+    done, joints, _ = drive(path, 40.0, most=most, dead=0.4)
+    assert done.ended == ARRIVED
+    gaps = [np.abs(path.joints - q).max(axis=1).min() for q in joints]
+    assert np.degrees(max(gaps)) < 3.0
+
+
+def test_a_way_up_and_down_again_is_not_cut_short() -> None:
+    """The boom up by 40 degrees and down, the swing 3 degrees on: let go on the way up."""
+    times = np.linspace(0.0, 8.0, 321)
+    u = times / 8.0
+    up = 0.35 * (1.0 - np.cos(2.0 * np.pi * u))
+    boom_rate = 0.35 * 2.0 * np.pi / 8.0 * np.sin(2.0 * np.pi * u)
+    swing = 0.05 * (10 * u**3 - 15 * u**4 + 6 * u**5)
+    swing_rate = 0.05 * (30 * u**2 - 60 * u**3 + 30 * u**4) / 8.0
+    none = np.zeros_like(times)
+    q = np.stack([swing, 0.1 + up, none - 1.0, none - 0.4], axis=1)
+    path = Trajectory(times, q, np.stack([swing_rate, boom_rate, none, none], axis=1))
+    done, joints, _ = drive(path, 30.0, held=(3.2, 4.8))
+    assert done.ended == ARRIVED
+    assert max(q[1] for q in joints) > 0.1 + 0.7 - 0.03
+    # Beside it, where the way down is nearer than the way up.
+    beside = path.at(3.2)[0].copy()
+    beside[0] = path.at(4.8)[0][0]
+    for moves in (True, False):
+        assert advance(Follow(path, at=3.2), beside, 0.0, moves, DT)[0].at < 3.6
+
+
+def test_let_go_and_pressed_again_at_once_it_goes_on() -> None:
+    done, _joints, _ = drive(quick(), 20.0, held=(2.3, 2.5))
+    assert done.ended == ARRIVED
 
 
 def test_it_does_not_begin_elsewhere() -> None:

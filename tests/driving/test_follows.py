@@ -40,10 +40,17 @@ class Following(Cockpit):
             self.methods,  # type: ignore[arg-type]
             lambda *event: self.events.append(event),
             self.radio.clock,
-            lambda machine, plan: self.path if plan == "p1" else None,
+            self,
         )
         self.q, self.rate = MIDDLE.copy(), np.zeros(N)
         self.least = 1.0  # of the limiter's fraction
+        self.void = ""
+
+    def offered(self, machine: str, plan: str) -> Trajectory | str:
+        return self.path if plan == "p1" else "no trajectory is called so"
+
+    def over(self, machine: str, plan: str) -> str:
+        return self.void
 
     def run(self, cycles: int = 5, period: float = 0.02) -> None:
         for _ in range(cycles):
@@ -174,3 +181,31 @@ def test_dropped_it_is_over() -> None:
     assert there.console(seat)["state"] == "Enabled"
     there.run()
     assert "left" not in there.driving.document()["seats"][seat]["follow"]
+
+
+def test_a_plan_that_holds_no_more_ends_it_and_says_why() -> None:
+    there = Following()
+    seat = there.begin()
+    there.move(seat, enable=True)
+    there.run(60)
+    there.void = "right:stick/0 is in its way now"
+    there.run(60)
+    assert there.follow(seat)["ended"] == there.void
+    stood = there.q.copy()
+    there.run(60)
+    np.testing.assert_allclose(there.q, stood, atol=1e-3)
+    ends = [e for e in there.events if e[0] == "console" and e[2].get("follow")]
+    assert ends == [("console", "ann", {"machine": "left", "follow": there.void})]
+
+
+def test_why_a_plan_is_refused_is_told_until_another_is_accepted() -> None:
+    there = Following()
+    seat = there.begin("p2")
+    told = there.driving.document()["seats"][seat]["follow_refused"]
+    assert told == {"left": "no trajectory is called so"}
+    assert there.driving.followed("left") is None
+    there.say(seat, "follow", do="accept", machine="left", plan="p1")
+    assert there.driving.document()["seats"][seat]["follow_refused"] == {}
+    found = there.driving.followed("left")
+    assert found is not None
+    assert found.plan == "p1"

@@ -94,6 +94,9 @@ class SeatModel(BaseModel):
     follow: dict[str, FollowModel] = Field(
         default_factory=dict, description="by machine that a trajectory is followed with"
     )
+    follow_refused: dict[str, str] = Field(
+        default_factory=dict, description="why a trajectory of that machine is not followed"
+    )
 
 
 class DrivingModel(BaseModel):

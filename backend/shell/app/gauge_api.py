@@ -10,6 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from backend.documents.gauge_choice import AreaDocument, GaugeStateDocument, area_of
 from backend.errors import InputError
+from backend.shell.app.answers import who
 from backend.shell.app.wire import dumps
 from backend.site.gauge_choice import Drawn, DrawnKind
 
@@ -80,31 +81,25 @@ def gauge_router(gauge: Gauge) -> APIRouter:
     def draw(asked: AreaRequest, request: Request) -> Response:
         """A new area to stay out of, or to stay in."""
         area = area_of(AreaDocument(**asked.model_dump()))
-        return changed(lambda: gauge.draw(area, False, _who(request)))
+        return changed(lambda: gauge.draw(area, False, who(request)))
 
     @router.put("/drawn/{name}", responses=answers)
     def redraw(name: str, asked: ShapeRequest, request: Request) -> Response:
         """An area's other shape; a new area where there is none of that name."""
         area = area_of(AreaDocument.model_construct(name=name, **asked.model_dump()))
-        return changed(lambda: gauge.draw(area, True, _who(request)))
+        return changed(lambda: gauge.draw(area, True, who(request)))
 
     @router.delete("/drawn/{name}", responses=answers)
     def erase(name: str, request: Request) -> Response:
         """A drawn area goes."""
-        return changed(lambda: gauge.erase(name, _who(request)))
+        return changed(lambda: gauge.erase(name, who(request)))
 
     @router.put("/switch", responses=answers)
     def switch(asked: SwitchRequest, request: Request) -> Response:
         """A limit volume holds whatever its state, for nobody, or as its state says."""
-        return changed(lambda: gauge.switch(asked.name, asked.on, _who(request)))
+        return changed(lambda: gauge.switch(asked.name, asked.on, who(request)))
 
     return router
-
-
-def _who(request: Request) -> str:
-    """Who is signed in; nobody is known where nobody is asked."""
-    person = getattr(request.state, "person", None)
-    return "" if person is None else str(person.who)
 
 
 def _json(document: Any, status: int = 200) -> Response:

@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from backend.documents.people import PeopleModel
+from backend.documents.plan_state import PlanOffer
 from backend.documents.stability import StabilityModel
 from backend.documents.working_area import WorkingAreaModel
 from backend.shell.app.driving_models import DrivingModel
@@ -206,6 +207,9 @@ class SnapshotModel(BaseModel):
     )
     recording: RecordingStateModel | None = Field(None, description="of this backend")
     driving: DrivingModel | None = Field(None, description="not in playback")
+    plans: dict[str, PlanOffer] = Field(
+        default_factory=dict, description="by own machine its newest trajectory; not in playback"
+    )
     demo: DemoModel | None = Field(None, description="only in the demo")
     playback: PlaybackModel | None = Field(None, description="only in playback")
 

@@ -9,6 +9,7 @@ from fastapi import APIRouter, Request, Response
 from backend.documents.use_case import UseCaseDocument
 from backend.documents.use_case_state import UseCaseRequest, UseCaseStateDocument
 from backend.errors import InputError
+from backend.shell.app.answers import refused, who
 from backend.shell.app.wire import dumps
 
 
@@ -41,15 +42,15 @@ def use_case_router(use_cases: UseCases) -> APIRouter:
     def start(asked: UseCaseRequest, request: Request) -> Response:
         """Work out one run, in simulated time; no machine moves by it. One at a time."""
         try:
-            use_cases.start(asked.name, asked.method, _who(request))
+            use_cases.start(asked.name, asked.method, who(request))
         except InputError as error:
-            return _refused(error, 409)
+            return refused(error, 409)
         return now()
 
     @router.delete("", responses=answers)
     def stop(request: Request) -> Response:
         """Give up what is being worked out."""
-        use_cases.stop(_who(request))
+        use_cases.stop(who(request))
         return now()
 
     @router.get("/{name}/{method}", responses={200: {"model": UseCaseDocument}})
@@ -58,16 +59,6 @@ def use_case_router(use_cases: UseCases) -> APIRouter:
         try:
             return Response(use_cases.text(name, method), media_type="application/json")
         except InputError as error:
-            return _refused(error, 404)
+            return refused(error, 404)
 
     return router
-
-
-def _refused(error: InputError, status: int) -> Response:
-    return Response(dumps({"detail": str(error)}), status, media_type="application/json")
-
-
-def _who(request: Request) -> str:
-    """Who is signed in; nobody is known where nobody is asked."""
-    person = getattr(request.state, "person", None)
-    return "" if person is None else str(person.who)

@@ -45,10 +45,11 @@ def seat_document(
     decisions: Mapping[str, tuple[Decision, Told]],
     machines: Mapping[str, Machine],
     follows: Mapping[str, Followed | None],
+    unfollowed: Mapping[str, str],
 ) -> dict[str, Any]:
     """name: of the seat; refused: by machine, what its last request was answered with; decisions:
     by machine, with what the seat's method made of the wish before; follows: by machine, what the
-    seat follows with it.
+    seat follows with it; unfollowed: by machine, why a trajectory was refused it.
     """
     mine = [machine for machine, lease in held.items() if lease.seat == name]
     return {
@@ -81,6 +82,7 @@ def seat_document(
             for machine, one in follows.items()
             if one is not None
         },
+        "follow_refused": {machine: why for machine, why in unfollowed.items() if why},
     }
 
 

@@ -26,7 +26,7 @@ from backend.safety.limiter import Decision, Latch, limit, open_latch
 from backend.safety.limits import Delay
 from backend.shell.driving import pages
 from backend.shell.driving.document import machine_document, seat_document
-from backend.shell.driving.follows import Follows, Plans
+from backend.shell.driving.follows import Followed, Follows, NoPlans, Plans
 from backend.shell.driving.leases import REFRESH, Held, Leases
 from backend.shell.driving.methods import Methods, Told
 from backend.shell.driving.outlet import Outlet
@@ -40,6 +40,8 @@ LATE = 0.4
 
 FAILED = 5.0
 """Without a cycle for longer than this, driving has failed: its leases are left to end [s]."""
+
+NO_PLANS = NoPlans()
 
 Event = Callable[[str, str, dict[str, Any]], None]
 """Told what happened ("lease", "console", "stop", ...), who did it, and details."""
@@ -69,7 +71,7 @@ class Driving:
         methods: Methods,
         event: Event = lambda *_: None,
         clock: Callable[[], float] = time.monotonic,
-        plans: Plans = lambda machine, plan: None,
+        plans: Plans = NO_PLANS,
     ) -> None:
         self._machines = dict(machines)
         self._outlets = dict(outlets)
@@ -81,6 +83,7 @@ class Driving:
         self._lock = threading.Lock()
         self._seats: dict[str, Seat] = {}
         self._follows = Follows(plans)
+        self._unfollowed: dict[tuple[str, str], str] = {}  # by seat and machine, why not
         self._decisions: dict[str, tuple[Decision, Told]] = {}
         self._fencing: dict[str, _Fencing] = {}
         self._stopped: dict[str, str] = {}  # machines that nobody has reset since, and why
@@ -108,6 +111,8 @@ class Driving:
         with self._lock:
             self._seats.pop(name, None)
             self._refused.discard(name)
+            for key in [key for key in self._unfollowed if key[0] == name]:
+                del self._unfollowed[key]
         self._leases.drop(name)
 
     def on_message(self, name: str, message: dict[str, Any]) -> bool:
@@ -131,6 +136,14 @@ class Driving:
     def driven(self) -> tuple[str, ...]:
         """Machines whose lease a seat of this cockpit holds."""
         return tuple(sorted(self._leases.all()))
+
+    def followed(self, machine: str) -> Followed | None:
+        """What is or was followed with a machine last; None where its lease is another one now."""
+        lease = self._leases.all().get(machine)
+        with self._lock:
+            found = self._follows.newest(machine)
+        current = lease is not None and found is not None and found.token == lease.token
+        return found if current else None
 
     def cycle(self, snapshot: Snapshot) -> None:
         """Sends what the newest snapshot allows of what the operators wish."""
@@ -203,6 +216,7 @@ class Driving:
                     self._decisions,
                     self._machines,
                     {machine: self._follows.of(machine, name) for machine in self._machines},
+                    {m: self._unfollowed.get((name, m), "") for m in self._machines},
                 )
                 for name, seat in present.items()
             },
@@ -222,7 +236,8 @@ class Driving:
         sticks, override = seats.wish(seat, name, machine), seats.override(seat, name)
         with self._lock:
             sat = lease.seat, seat, lease.token
-            sticks = self._follows.wish(name, machine, sat, snapshot, delay, now) or sticks
+            followed = self._follows.wish(name, machine, sat, snapshot, delay, now)
+        sticks = followed or sticks
         shaped, told = self._methods.shape(
             name, seat.setting.method, sticks, snapshot, overridden=override is not None
         )
@@ -240,6 +255,9 @@ class Driving:
         )
         if link.locked:
             decision = replace(decision, locked=link.locked)
+        if followed is not None:
+            with self._lock:
+                self._follows.allowed(name, decision.joints)
         self._fencing[name] = _Fencing(lease.token, decision.latch)
         outlet.send(decision, lease.who, lease.token)
         return decision, told
@@ -329,6 +347,7 @@ class Driving:
                 refused = "who follows holds the machine's lease"
             else:
                 refused = self._follows.accept(said.machine, name, lease.token, said.plan)
+            self._unfollowed[name, said.machine] = refused
         details = {"do": said.do, "machine": said.machine, "plan": said.plan, "refused": refused}
         self._event("follow", seat.person.who, details)
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 
@@ -17,12 +17,34 @@ from backend.pipeline.braking import age_of
 from backend.pipeline.records import Snapshot
 from backend.safety.limiter import Wish
 from backend.safety.limits import Delay
+from backend.spatial.types import Array
 
 MOST_LAG = 0.6
 """No machine moves when its data and commands take longer [s]."""
 
-Plans = Callable[[str, str], Trajectory | None]
-"""The trajectory of a machine by its plan's name; None where there is none."""
+
+class Plans(Protocol):
+    """What may be followed, by the names of machine and plan."""
+
+    def offered(self, machine: str, plan: str) -> Trajectory | str:
+        """What can be followed from its beginning, or why it cannot."""
+        ...
+
+    def over(self, machine: str, plan: str) -> str:
+        """Why what is followed must not be any more; empty while it may."""
+        ...
+
+
+class NoPlans:
+    """Where nothing is planned."""
+
+    def offered(self, machine: str, plan: str) -> Trajectory | str:
+        """Never anything."""
+        return f"{plan or 'a plan without a name'}: no trajectory of this machine is called so"
+
+    def over(self, machine: str, plan: str) -> str:
+        """Nothing is followed."""
+        return "nothing is planned here"
 
 
 @dataclass(frozen=True)
@@ -46,9 +68,9 @@ class Follows:
 
     def accept(self, machine: str, seat: str, token: int, plan: str) -> str:
         """Why not, empty when it is followed from now on, as soon as the dead-man is held."""
-        trajectory = self._plans(machine, plan)
-        if trajectory is None:
-            return f"{plan or 'a plan without a name'}: no trajectory of this machine is called so"
+        trajectory = self._plans.offered(machine, plan)
+        if isinstance(trajectory, str):
+            return trajectory
         self._by_machine[machine] = Followed(seat, token, plan, Follow(trajectory))
         return ""
 
@@ -59,8 +81,13 @@ class Follows:
             del self._by_machine[machine]
 
     def of(self, machine: str, seat: str) -> Followed | None:
+        """What that seat follows with the machine."""
         found = self._by_machine.get(machine)
         return found if found is not None and found.seat == seat else None
+
+    def newest(self, machine: str) -> Followed | None:
+        """What is or was followed with the machine last, whoever's it is."""
+        return self._by_machine.get(machine)
 
     def wish(
         self,
@@ -82,6 +109,10 @@ class Follows:
         console = sat.desk.consoles.get(name)
         if console is None or name != sat.desk.driven:
             return None
+        over = self._plans.over(name, found.plan)
+        if over:
+            self._by_machine[name] = replace(found, follow=replace(found.follow, ended=over))
+            return None
         if console.state in (State.ACTIVE, State.OVERRIDE, State.STOP):
             why = "a stick was moved" if console.state is State.ACTIVE else console.state.value
             self._by_machine[name] = replace(found, follow=replace(found.follow, ended=why))
@@ -96,12 +127,18 @@ class Follows:
             state.pose.joints,
             lag,
             console.state is State.ENABLED,
-            dt if 0.0 < dt < 0.2 else 0.0,
+            dt if dt > 0.0 else 0.0,
             np.array([joint.continuous for joint in machine.joints]),
         )
         self._by_machine[name] = replace(found, follow=following, cycled=now)
         full = machine.max_velocity
         return Wish(np.clip(rates, -full, full), np.zeros(2))
+
+    def allowed(self, name: str, sent: Array) -> None:
+        """What the limiter left of the wish of this cycle: (n,) [rad/s]."""
+        found = self._by_machine.get(name)
+        if found is not None:
+            self._by_machine[name] = replace(found, follow=rules.allowed(found.follow, sent))
 
     def ended(self) -> list[tuple[str, Followed]]:
         """What ended since it was asked last, each once."""

@@ -1,5 +1,6 @@
 // The operator's lines of the control panel: what state it is in, why, and what to do.
 
+import { number } from "../axis.js";
 import { label, state } from "../state.js";
 import { percent, isBlocked } from "../plots/arrow.js";
 import { consoles, decision, holds, method, pattern, remote, seat } from "./driving.js";
@@ -51,6 +52,10 @@ export function lines(name) {
   if (mine.state === "Override") return [`OVERRIDE by ${state.you?.who}: ${seat()?.override || why}`, "OVERRIDE: limits are off"];
   if (local.ignored.length) return [`Only the ${local.source || "device"} in use counts: the ${local.ignored.join(", ")} does nothing`, `Only the ${local.source} counts`];
   if (mine.state === "Active") return [""];
+  const follow = seat()?.follow?.[name];
+  const follows = follow && !follow.ended;
+  if (mine.state === "Enabled" && follows) return [`Follows ${follow.plan}: ${number(follow.at, 1)} of ${number(follow.duration, 1)} s. Let go to stop`, `Follows ${follow.plan}`];
+  if (follows) return [`${sentence(why)} Sticks in neutral, then hold ${hold} to follow ${follow.plan}`.trim(), `Hold ${hold} to follow`];
   if (mine.state === "Enabled") return [`${sentence(why)} Move a stick`.trim(), "Move a stick"];
   return [`${sentence(why)} Sticks in neutral, then hold ${hold}`.trim(), `Hold ${hold} to enable`];
 }

@@ -1,7 +1,7 @@
 // The frame of a small chart over time, and the scales that live and recorded trends share.
 
 import { C, size } from "../theme.js";
-import { scale } from "../axis.js";
+import { number, scale, ticks } from "../axis.js";
 import { label, segment } from "../pen.js";
 import { state } from "../state.js";
 
@@ -33,6 +33,22 @@ export function frame(g, { left, right, height }, across, up, title, unit, width
   }
   label(g, title, box.left, 1, { base: "top", colour: C.second });
   return { box, x, y, unit };
+}
+
+/** Round ticks of at most `most` from low to high, and the ends moved out to them. */
+export function upward(low, high, most) {
+  const steps = [0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, 200];
+  const step = steps.find((s) => (high - low) / s <= most) ?? 500;
+  const from = Math.floor(low / step + 1e-6) * step, to = Math.max(from + step, Math.ceil(high / step - 1e-6) * step);
+  return { from, to, marks: ticks(from, to, most + 2, [step]).map((v) => [v, number(v, step < 0.1 ? 2 : step < 1 ? 1 : 0)]) };
+}
+
+/** Points of a series, thinned to one a pixel, broken where there is none. */
+export function points({ box, x, y }, times, values) {
+  const step = Math.max(1, Math.floor(times.length / Math.max(1, box.right - box.left)));
+  const found = [];
+  for (let i = 0; i < times.length; i += step) found.push(Number.isFinite(values[i]) ? [x(times[i]), y(Math.min(Math.max(values[i], y.from), y.to))] : null);
+  return found;
 }
 
 /** A curve through points [x, y] in pixels, broken at nulls, clipped to the box. */

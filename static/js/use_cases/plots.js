@@ -3,7 +3,7 @@
 import { C, size } from "../theme.js";
 import { deg, metres, number, ticks } from "../axis.js";
 import { clear, label, legend, message, segment, swatches } from "../pen.js";
-import { curve, frame } from "../plots/chart.js";
+import { curve, frame, points, upward } from "../plots/chart.js";
 import { surface } from "../surface.js";
 import { $ } from "../words.js";
 import * as model from "./model.js";
@@ -31,23 +31,7 @@ export function turn(which) {
 
 const charts = {};
 
-/** Round ticks of at most `most` from low to high, and the ends moved out to them. */
-function upward(low, high, most) {
-  const steps = [0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, 200];
-  const step = steps.find((s) => (high - low) / s <= most) ?? 500;
-  const from = Math.floor(low / step + 1e-6) * step, to = Math.max(from + step, Math.ceil(high / step - 1e-6) * step);
-  return { from, to, marks: ticks(from, to, most + 2, [step]).map((v) => [v, number(v, step < 0.1 ? 2 : step < 1 ? 1 : 0)]) };
-}
-
 const every = () => model.methods().map(({ name, words }) => ({ name, words, run: model.run(name) })).filter(({ run }) => run);
-
-/** Points of a series, thinned to one a pixel. */
-function points({ box, x, y }, times, values) {
-  const step = Math.max(1, Math.floor(times.length / Math.max(1, box.right - box.left)));
-  const found = [];
-  for (let i = 0; i < times.length; i += step) found.push([x(times[i]), y(Math.min(Math.max(values[i], y.from), y.to))]);
-  return found;
-}
 
 /** The lowest one alone writes times below itself: all three have the same. */
 function plot(g, width, height, up, title, unit, lowest = false) {
