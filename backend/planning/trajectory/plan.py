@@ -17,6 +17,7 @@ from backend.planning.trajectory.rows import limit_rows
 from backend.planning.trajectory.sweep import CONTACT, Sweep, make_sweep
 from backend.planning.trajectory.timing import Timed, casadi_timing, toppra_timing
 from backend.planning.trajectory.way import Way, find_way, search
+from backend.spatial.boxes import Boxes
 from backend.spatial.types import Array
 from backend.stability.dynamics import down, wrench_of
 from backend.stability.masses import MassModel, mass_model, why_unknown
@@ -145,8 +146,10 @@ def _trajectory(
     return Trajectory(t, q, rates, accelerations, method, way.how, checks, notes)
 
 
-def rehearse(machine: Machine) -> None:
-    """Makes the compiled parts ready: a task without and one with something in the way."""
+def rehearse(machine: Machine) -> Trajectory | Refusal:
+    """Makes the compiled parts ready and loads the rest: a swing and a search in the air, past a
+    box. Returns what came of the swing.
+    """
     low = np.where(np.isfinite(machine.lower), machine.lower, -1.0)
     high = np.where(np.isfinite(machine.upper), machine.upper, 1.0)
     q = 0.5 * (low + high)
@@ -154,6 +157,9 @@ def rehearse(machine: Machine) -> None:
     goal = q.copy()
     goal[0] += 0.5
     task = Task(q, end_point(machine, goal), band=0.2)
-    sweep, carry = make_sweep(machine, Obstacles(), task.clearance), carry_of(machine, q)
+    aside = 3.0 * np.array([[0.0, 0.0, machine.bounding_radius]])
+    box = Boxes(aside, np.eye(3)[None], np.full((1, 3), 0.1))
+    obstacles = Obstacles(box, ("box",), ground=False)
+    sweep, carry = make_sweep(machine, obstacles, task.clearance).relaxed(q), carry_of(machine, q)
     search(machine, task, sweep, carry, goal[None], np.zeros(len(sweep.names), np.int64), 0, 50)
-    plan(machine, task, Obstacles())
+    return plan(machine, task, obstacles)

@@ -5,16 +5,16 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from backend.planning.trajectory.sweep_kernels import Boxed, Chain, Pairs, advance, within
+from backend.planning.trajectory.sweep_kernels import Boxed, Chain, Pairs, blocker, within
 from backend.spatial.types import Array, IntArray
 
 
 @njit(cache=True, nogil=True)
 def free_edge(
     chain: Chain, boxes: Boxed, pairs: Pairs, turn: tuple[Array, Array], x0: Array, x1: Array
-) -> tuple[float, int, int]:
-    """`advance` from x0 to x1, where q = turn[0] @ x + turn[1]."""
-    return advance(chain, boxes, pairs, turn[0] @ x0 + turn[1], turn[0] @ x1 + turn[1])
+) -> int:
+    """`blocker` from x0 to x1, where q = turn[0] @ x + turn[1]."""
+    return blocker(chain, boxes, pairs, turn[0] @ x0 + turn[1], turn[0] @ x1 + turn[1])
 
 
 @njit(cache=True, nogil=True)
@@ -53,7 +53,7 @@ def connect(
         new = _towards(nodes[a, near], target, weights, longest)
         if not within(turn[0] @ new + turn[1], low, high):
             continue
-        _, hit, _ = free_edge(chain, boxes, pairs, turn, nodes[a, near], new)
+        hit = free_edge(chain, boxes, pairs, turn, nodes[a, near], new)
         if hit >= 0:
             hits[hit] += 1
             continue
@@ -67,7 +67,7 @@ def connect(
             step = _towards(nodes[b, at], new, weights, longest)
             if not within(turn[0] @ step + turn[1], low, high):
                 break
-            _, hit, _ = free_edge(chain, boxes, pairs, turn, nodes[b, at], step)
+            hit = free_edge(chain, boxes, pairs, turn, nodes[b, at], step)
             if hit >= 0:
                 hits[hit] += 1
                 break
@@ -108,7 +108,7 @@ def shorten(
         r = now[j] + (v - along[j]) / max(along[j + 1] - along[j], 1e-300) * (now[j + 1] - now[j])
         if _far(p, r, weights) > v - u - 1e-6:
             continue
-        _, hit, _ = free_edge(chain, boxes, pairs, turn, p, r)
+        hit = free_edge(chain, boxes, pairs, turn, p, r)
         if hit >= 0:
             continue
         shorter = np.empty((i + 1 + 2 + len(now) - 1 - j, now.shape[1]))
@@ -132,9 +132,11 @@ def _far(a: Array, b: Array, weights: Array) -> float:
 def _nearest(nodes: Array, used: int, x: Array, weights: Array) -> int:
     best, at = np.inf, 0
     for i in range(used):
-        d = _far(nodes[i], x, weights)
-        if d < best:
-            best, at = d, i
+        square = 0.0
+        for k in range(len(weights)):
+            square += (weights[k] * (nodes[i, k] - x[k])) ** 2
+        if square < best:
+            best, at = square, i
     return at
 
 
