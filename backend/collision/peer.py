@@ -92,6 +92,24 @@ class FclScene:
             between(box, k, d, j, after)
         return float(least)
 
+    def each_along(self, half_extents: Array, centers: Array, rotations: Array) -> Array:
+        """(m,) the same of each place, all of them asked for."""
+        moved: list[Any] = [
+            fcl_box(np.zeros(3), np.eye(3), np.asarray(half)) for half in half_extents
+        ]
+        still, moving = self._made(), fcl.DynamicAABBTreeCollisionManager()
+        moving.registerObjects(moved)
+        moving.setup()
+        found = np.empty(len(centers))
+        for m in range(len(centers)):
+            for one, center, rotation in zip(moved, centers[m], rotations[m], strict=True):
+                one.setTransform(fcl.Transform(rotation, center))
+            moving.update()
+            data = fcl.DistanceData()
+            moving.distance(still, data, fcl.defaultDistanceCallback)
+            found[m] = max(float(data.result.min_distance), 0.0)
+        return found
+
     def by_manager(self, links: Boxes) -> Array:
         """(links,) the same by the broad-phase manager, one query for each link [m]."""
         manager, found = self._made(), []

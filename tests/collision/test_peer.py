@@ -45,6 +45,7 @@ def test_least_along_a_motion_is_that_of_every_place(seed: int) -> None:
     ]
     least = scene.least_along(half, centers, rotations)
     assert least == pytest.approx(min(every), abs=1e-9)
+    np.testing.assert_allclose(scene.each_along(half, centers, rotations), every, atol=1e-9)
 
 
 def test_a_moment_of_contact_between_far_ends_is_found() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from plan_tasks import judged, random_task
+from plan_tasks import judged
 
 from backend.documents.plan import proven
 from backend.errors import InputError
@@ -14,6 +14,7 @@ from backend.planning.trajectory.carry import attitude_of, carry_of
 from backend.planning.trajectory.plan import plan, rehearse
 from backend.planning.trajectory.records import Obstacles, Refusal, Task, Trajectory
 from backend.spatial.boxes import Boxes
+from cockpit.bench_tasks import random_task
 
 MINI = load_machine("mini")
 START = np.array([0.0, 0.6, -1.2, -0.4])
