@@ -12,7 +12,7 @@ from backend.machine.load import load_machine
 from backend.machine.model import Machine
 from backend.planning.trajectory.carry import attitude_of, from_cylinder
 from backend.planning.trajectory.curve import Curve, curve_along
-from backend.planning.trajectory.records import Obstacles, Task
+from backend.planning.trajectory.records import Cylindrical, Obstacles, Task
 from backend.planning.trajectory.sweep import make_sweep
 from backend.spatial import rotation
 from backend.spatial.boxes import Boxes
@@ -79,3 +79,27 @@ def _apart(machine: Machine, boxes: Boxes, postures: Array, least: float) -> Boo
     for T in link_poses(machine, postures):
         kept &= lower_bounds(body_boxes(machine, T), boxes).min(axis=0) > least
     return kept
+
+
+def paper_task() -> tuple[Machine, Task, Obstacles]:
+    """As in Yamashita and Kikuuwe 2025: the same carry with the limits that it states, something
+    on the line from start to goal; load, heights and the obstacle are not given there.
+    """
+    machine = load_machine("ex13")
+    ends = np.array([[np.pi / 6, 5.0, 1.0], [5 * np.pi / 6, 5.0, 1.0]])
+    q, inside = from_cylinder(machine, ends, np.full(2, -1.9))
+    if not inside:
+        raise RuntimeError("ex13 cannot make the move that it is to be measured by")
+    limits = Cylindrical(np.array([0.08, 1.0, 0.25]), np.array([0.04, 5.0, 3.0]))
+    task = Task(
+        q[0],
+        end_point(machine, q[1]),
+        attitude=-1.9,
+        payload=1500.0,
+        clearance=0.1,
+        lift=0.5,
+        cylindrical=limits,
+    )
+    top = 0.5 * (machine.arm.T_root_swing[2, 3] + 1.6)
+    thing = Boxes(np.array([[0.0, 5.2, top]]), np.eye(3)[None], np.array([[0.3, 0.3, top]]))
+    return machine, task, Obstacles(thing, ("thing",))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from backend.cspace.joint_image import certified4
@@ -19,6 +21,7 @@ from backend.fusion.crs import SiteFrame
 from backend.machine.kinematics import end_point
 from backend.machine.model import Machine
 from backend.planning.trajectory.carry import goals
+from backend.planning.trajectory.penalty import Iteration
 from backend.planning.trajectory.plan import Method, plan
 from backend.planning.trajectory.records import (
     Cylindrical,
@@ -42,11 +45,13 @@ def plan_document(
     frame: SiteFrame | None,
     where: str = "task",
     site: SiteBodies = NO_SITE_BODIES,
-    method: Method = "toppra",
+    method: Method | None = None,
+    told: Callable[[Iteration], None] | None = None,
 ) -> PlanDocument:
     """A trajectory or why there is none; raises InputError for a task that makes no sense.
 
-    machines: the description of every machine of the state; site: what stands on the site besides.
+    machines: the description of every machine of the state; site: what stands on the site besides;
+    method: the task's when None; told: hears of every step of the penalty method.
     """
     if asked.machine not in machines:
         known = ", ".join(machines)
@@ -58,9 +63,10 @@ def plan_document(
     task = _task(asked, scene, where)
     around = scene.around(asked.machine)
     obstacles = Obstacles(around.boxes, around.names, asked.ground)
-    made = plan(machine, task, obstacles, method)
+    method = asked.method if method is None else method
+    made = plan(machine, task, obstacles, method, told)
     document = PlanDocument(
-        ok=isinstance(made, Trajectory),
+        ok=isinstance(made, Trajectory) and not made.violations,
         machine=asked.machine,
         method=method,
         clearance=task.clearance,
@@ -77,6 +83,10 @@ def plan_document(
         )
     points = end_point(machine, made.q, body.link_poses[0]) + scene.origin
     checks = made.checks
+    if made.violations:
+        why = f"the {method} method's result is violated: {' '.join(made.violations)}"
+        broken = {"why": why, "kind": "check", "proven": False, "violations": [*made.violations]}
+        document = document.model_copy(update=broken)
     return document.model_copy(
         update={
             "duration": made.duration,

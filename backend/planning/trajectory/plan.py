@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Literal
 
 import numpy as np
@@ -11,33 +12,45 @@ from backend.machine.model import Machine
 from backend.planning.trajectory.carry import attitude_of, carry_of
 from backend.planning.trajectory.course import Course, Setting, course, setting
 from backend.planning.trajectory.curve import Curve
+from backend.planning.trajectory.penalty import Iteration
 from backend.planning.trajectory.recheck import overdone, recheck
 from backend.planning.trajectory.records import Checks, Obstacles, Refusal, Task, Trajectory
+from backend.planning.trajectory.reference import by_penalty
 from backend.planning.trajectory.rows import limit_rows
-from backend.planning.trajectory.sweep import Sweep, make_sweep
+from backend.planning.trajectory.sweep import make_sweep
 from backend.planning.trajectory.timing import Timed, casadi_timing, toppra_timing
-from backend.planning.trajectory.way import Way, search
+from backend.planning.trajectory.way import search
 from backend.spatial.boxes import Boxes
 
-Method = Literal["toppra", "casadi"]
-METHODS: tuple[Method, ...] = ("toppra", "casadi")
+Method = Literal["toppra", "casadi", "penalty"]
+METHODS: tuple[Method, ...] = ("toppra", "casadi", "penalty")
 STEP = 0.05
 """Between two rows of the result [s]."""
+MISSED, OVER = 0.01, 1.01
+"""By how much the penalty method may miss the goal [m] and exceed limits along theta, r, z, which
+it never keeps exactly."""
 _RESERVE = 1.004  # for what lies between the samples of that
 INTERVALS = (160, 800)
 """Fewest and most on the grid of the timing."""
 
 
 def plan(
-    machine: Machine, task: Task, obstacles: Obstacles, method: Method = "toppra"
+    machine: Machine,
+    task: Task,
+    obstacles: Obstacles,
+    method: Method = "toppra",
+    told: Callable[[Iteration], None] | None = None,
 ) -> Trajectory | Refusal:
     """Time-optimal along a free way, re-checked. Raises InputError for a task that makes no sense.
 
-    The root frame is the task's: obstacles and goal are given in it.
+    The root frame is the task's: obstacles and goal are given in it. The penalty method's result
+    comes with its violations; `told` hears of each of its steps.
     """
     within = setting(machine, task, obstacles)
     if isinstance(within, Refusal):
         return within
+    if method == "penalty":
+        return _penalty(machine, task, obstacles, within, told)
     found = course(machine, task, within)
     if isinstance(found, Refusal):
         return found
@@ -48,14 +61,50 @@ def plan(
     checks = recheck(
         machine, task, obstacles, within.sweep, curve, time, within.masses, within.whole
     )
-    why = _failed(task, within.sweep, checks)
-    if why:
-        return Refusal("check", why)
-    notes = list(within.notes)
-    changed = float(attitude_of(machine, way.points[-1]) - attitude_of(machine, task.q))
-    if task.attitude is None and abs(changed) > 1e-6:
-        notes.append(f"the bucket's attitude changes by {np.degrees(changed):.0f} degrees")
-    return _trajectory(curve, time, method, way, checks, tuple(notes))
+    broken = _broken(within, checks)
+    if broken:
+        return Refusal("check", broken[0])
+    return _trajectory(curve, time, method, way.how, checks, _notes(machine, task, within))
+
+
+def _penalty(
+    machine: Machine,
+    task: Task,
+    obstacles: Obstacles,
+    within: Setting,
+    told: Callable[[Iteration], None] | None,
+) -> Trajectory:
+    made = by_penalty(machine, task, obstacles, within, told)
+    checks = recheck(
+        machine, task, obstacles, within.sweep, made.curve, made.time, within.masses, within.whole
+    )
+    broken = _broken(within, checks)
+    if not made.reachable:
+        broken.append("it leaves the arm's reach or the joints' ends.")
+    if made.missed > MISSED:
+        broken.append(f"it ends {made.missed:.2f} m from the goal.")
+    if made.over > OVER:
+        broken.append(f"it takes {made.over:.2f} times a limit along theta, r or z.")
+    if made.moving > OVER - 1.0:
+        broken.append(f"a joint still moves at the end, at {made.moving:.2f} of its full speed.")
+    exact = f"it ends {1e3 * made.missed:.0f} mm from the goal"
+    return _trajectory(
+        made.curve,
+        made.time,
+        "penalty",
+        f"{made.steps} steps of steepest descent",
+        checks,
+        (*_notes(machine, task, within), exact),
+        tuple(broken),
+    )
+
+
+def _notes(machine: Machine, task: Task, within: Setting) -> tuple[str, ...]:
+    changed = float(attitude_of(machine, within.ends[0]) - attitude_of(machine, task.q))
+    if task.attitude is not None or abs(changed) <= 1e-6:
+        return within.notes
+    turned = f"the bucket's attitude changes by {np.degrees(changed):.0f} degrees"
+    return (*within.notes, turned)
 
 
 def timing(
@@ -72,23 +121,30 @@ def timing(
     return time.slowed(_RESERVE * overdone(machine, task, curve, time))
 
 
-def _failed(task: Task, sweep: Sweep, checks: Checks) -> str:
+def _broken(within: Setting, checks: Checks) -> list[str]:
     """Why the judge refuses, empty when it does not."""
-    if checks.min_clearance < sweep.kept - 1e-6 or checks.min_own <= 0.0:
-        return "the re-check found the way nearer to something than it was planned."
+    found = []
+    if checks.min_clearance < within.sweep.kept - 1e-6 or checks.min_own <= 0.0:
+        found.append("the re-check found the way nearer to something than it was planned.")
     if checks.min_stability_margin <= 0.0:
-        return "the re-check found the machine to tip over."
+        found.append("the re-check found the machine to tip over.")
     if max(checks.worst_rate, checks.worst_acceleration) > 1.001:
-        return "the re-check found joints faster than their limits."
-    return ""
+        found.append("the re-check found joints faster than their limits.")
+    return found
 
 
 def _trajectory(
-    curve: Curve, time: Timed, method: str, way: Way, checks: Checks, notes: tuple[str, ...]
+    curve: Curve,
+    time: Timed,
+    method: str,
+    how: str,
+    checks: Checks,
+    notes: tuple[str, ...],
+    violations: tuple[str, ...] = (),
 ) -> Trajectory:
     t = time.times(STEP)
     q, rates, accelerations = time.sampled(curve, t)
-    return Trajectory(t, q, rates, accelerations, method, way.how, checks, notes)
+    return Trajectory(t, q, rates, accelerations, method, how, checks, notes, violations)
 
 
 def rehearse(machine: Machine) -> Trajectory | Refusal:
