@@ -101,16 +101,12 @@ def blocker(chain: Chain, boxes: Boxed, pairs: Pairs, q0: Array, q1: Array) -> i
         d0, d1 = _spheres(C0, i, j, size), _spheres(C1, i, j, size)
         if min(d0, d1) >= clear[p] and d0 + d1 >= enough:
             continue
-        d1 = lower_bound(C1, R1, H, i, C1, R1, H, j)
-        if d1 <= 0.0 or d1 < clear[p]:
-            d1 = _distance(C1, R1, H, i, j, d1)
-            if d1 < clear[p]:
-                return p
-        d0 = lower_bound(C0, R0, H, i, C0, R0, H, j)
-        if d0 <= 0.0 or d0 < clear[p] or d0 + d1 < enough:
-            d0 = _distance(C0, R0, H, i, j, d0)
-            if d0 < clear[p]:
-                return p
+        d1 = _at_least(C1, R1, H, i, j, clear[p])
+        if d1 < clear[p]:
+            return p
+        d0 = _at_least(C0, R0, H, i, j, clear[p])
+        if d0 < clear[p]:
+            return p
         if d0 + d1 >= enough:
             continue
         begin[p] = (d0 - keep[p]) / speed[p]
@@ -129,10 +125,7 @@ def blocker(chain: Chain, boxes: Boxed, pairs: Pairs, q0: Array, q1: Array) -> i
         for m in range(n):
             p = left[m]
             if begin[p] <= t:
-                i, j = first[p], second[p]
-                d = lower_bound(C0, R0, H, i, C0, R0, H, j)
-                if d <= 0.0 or d < clear[p] or t + (d - keep[p]) / speed[p] < end[p]:
-                    d = _distance(C0, R0, H, i, j, d)
+                d = _at_least(C0, R0, H, first[p], second[p], clear[p])
                 if d < clear[p]:
                     return p
                 begin[p] = t + (d - keep[p]) / speed[p]
@@ -148,6 +141,15 @@ def _spheres(C: Array, i: int, j: int, size: float) -> float:
     """Distance of spheres about the i-th and the j-th of C (b, 3), their radii `size` together."""
     x, y, z = C[i, 0] - C[j, 0], C[i, 1] - C[j, 1], C[i, 2] - C[j, 2]
     return np.sqrt(x * x + y * y + z * z) - size
+
+
+@njit(cache=True, nogil=True)
+def _at_least(C: Array, R: Array, H: Array, i: int, j: int, enough: float) -> float:
+    """A lower bound of the distance that is `enough`, else the distance; negative on overlap."""
+    bound = lower_bound(C, R, H, i, C, R, H, j)
+    if bound > 0.0 and bound >= enough:
+        return bound
+    return _distance(C, R, H, i, j, bound)
 
 
 @njit(cache=True, nogil=True)
