@@ -30,6 +30,7 @@ from cockpit.bench_cspace import cspace_rows
 from cockpit.bench_input import cycles
 from cockpit.bench_live import crowded_rows, live_rows
 from cockpit.bench_people import people_rows
+from cockpit.bench_plan import plan_rows
 from cockpit.bench_recording import recording_rows
 from cockpit.bench_rows import percentile_rows
 from cockpit.bench_session import session_rows
@@ -52,6 +53,7 @@ def run_bench(as_json: bool, seconds: float, only: str = "") -> None:
         ("distances", lambda: distance_rows(next(iter(models.values())))),
         ("collision server", collision_rows),
         ("joint images", cspace_rows),
+        ("planning trajectories", plan_rows),
         ("people", people_rows),
         ("recording", lambda: recording_rows(site, config, seconds)),
         ("a session of an hour", lambda: session_rows(site, config, seconds)),

@@ -14,7 +14,14 @@ def plan(
         str | None,
         typer.Option("--site", help="Shipped site's name or path; omitted: a local frame."),
     ] = None,
-    method: Annotated[str, typer.Option(help="Of the timing: toppra or casadi.")] = "toppra",
+    method: Annotated[
+        str | None,
+        typer.Option(
+            help="Of the timing: toppra or casadi; or penalty, the one of Yamashita 2025, to "
+            "compare with. Omitted: the task's.",
+            show_default=False,
+        ),
+    ] = None,
     json_: Annotated[bool, typer.Option("--json", help="Print JSON instead of words.")] = False,
 ) -> None:
     """Find a trajectory to a goal that touches nothing and does not tip, or say what blocks."""

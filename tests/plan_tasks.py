@@ -1,4 +1,4 @@
-"""Random tasks among random obstacles, and a judge that shares no code with what plans."""
+"""A judge of trajectories that shares no code with what plans them."""
 
 from __future__ import annotations
 
@@ -7,15 +7,11 @@ from typing import NamedTuple
 import fcl
 import numpy as np
 
-from backend.collision.box_distance import lower_bounds
 from backend.machine.kinematics import body_boxes, end_point, link_poses
 from backend.machine.model import Machine
-from backend.planning.trajectory.carry import attitude_of
 from backend.planning.trajectory.records import Obstacles, Task, Trajectory
-from backend.planning.trajectory.sweep import make_sweep
-from backend.spatial import rotation
 from backend.spatial.boxes import Boxes
-from backend.spatial.types import Array, BoolArray
+from backend.spatial.types import Array
 from backend.stability.masses import mass_model
 from backend.stability.polygon import support_polygon
 from backend.stability.zmp import edge_moments
@@ -30,44 +26,6 @@ class Judged(NamedTuple):
     tipped: bool
     beyond: float
     missed: float
-
-
-def random_task(machine: Machine, seed: int) -> tuple[Task, Obstacles]:
-    """Start and goal at random; slabs, poles, walls and loose boxes over, under and beside."""
-    rng = np.random.default_rng(seed)
-    reach = machine.max_reach
-    low = np.where(np.isfinite(machine.lower), machine.lower, -np.pi)
-    high = np.where(np.isfinite(machine.upper), machine.upper, np.pi)
-    while True:
-        start, goal = (low + rng.random(len(low)) * (high - low) for _ in range(2))
-        start[4:] = goal[4:] = 0.0
-        tips = end_point(machine, np.stack([start, goal]))
-        clear = make_sweep(machine, Obstacles(), 0.2)
-        if tips[:, 2].min() > 0.2 and not clear.near(start) and not clear.near(goal):
-            break
-    count = int(rng.integers(2, 12))
-    around = rng.uniform(-np.pi, np.pi, count)
-    far = reach * rng.uniform(0.35, 0.95, count)
-    up = rng.uniform(0.0, 0.8 * reach, count)
-    centers = np.stack([far * np.cos(around), far * np.sin(around), up], axis=1)
-    shapes = np.array([[0.05, 0.05, 0.5], [0.5, 0.5, 0.04], [0.04, 0.5, 0.4], [0.12, 0.12, 0.12]])
-    half = shapes[rng.integers(0, 4, count)] * reach * rng.uniform(0.3, 1.0, (count, 1))
-    turns = rotation.from_quaternion(
-        np.stack([np.cos(around / 2), 0 * around, 0 * around, np.sin(around / 2)], axis=1)
-    )
-    boxes = Boxes(centers, turns, half)
-    kept = _apart(machine, boxes, np.stack([start, goal]), 0.25)
-    boxes = boxes.take(kept)
-    names = tuple(f"box {k}" for k in range(len(boxes)))
-    task = Task(
-        start,
-        tips[1],
-        attitude=float(attitude_of(machine, goal)) if rng.random() < 0.7 else None,
-        band=float(rng.choice([0.0, 0.3, 1.0])),
-        payload=float(rng.choice([0.0, 0.5, 1.0])) * machine.payload,
-        clearance=float(rng.choice([0.05, 0.1, 0.2])),
-    )
-    return task, Obstacles(boxes, names)
 
 
 def judged(machine: Machine, task: Task, obstacles: Obstacles, made: Trajectory) -> Judged:
@@ -100,14 +58,6 @@ def judged(machine: Machine, task: Task, obstacles: Obstacles, made: Trajectory)
         beyond = np.inf
     missed = float(np.linalg.norm(end_point(machine, made.q[-1]) - task.p_root))
     return Judged(touched, bool(moments.min() < 0.0), beyond, missed)
-
-
-def _apart(machine: Machine, boxes: Boxes, postures: Array, least: float) -> BoolArray:
-    """(n,) which boxes are farther than `least` [m] from the machine in all postures."""
-    kept = np.ones(len(boxes), dtype=bool)
-    for T in link_poses(machine, postures):
-        kept &= lower_bounds(body_boxes(machine, T), boxes).min(axis=0) > least
-    return kept
 
 
 def _between(made: Trajectory, t: Array) -> tuple[Array, Array]:

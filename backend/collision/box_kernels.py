@@ -12,36 +12,39 @@ _NO_AXIS = 1e-9  # length below which a crossed axis gives no direction
 
 
 @njit(cache=True, nogil=True)
-def lower_bounds(ca: Array, Ra: Array, ha: Array, cb: Array, Rb: Array, hb: Array) -> Array:
-    """(n, m) lower bounds of the distances of all pairs [m].
+def lower_bound(
+    ca: Array, Ra: Array, ha: Array, i: int, cb: Array, Rb: Array, hb: Array, j: int
+) -> float:
+    """Lower bound of the distance of a's i-th box and b's j-th [m], 0 where no face parts them.
 
     Each box against the other's bounding box in its own frame, the larger of both.
     """
+    x, y, z = cb[j, 0] - ca[i, 0], cb[j, 1] - ca[i, 1], cb[j, 2] - ca[i, 2]
+    wide_0, wide_1, wide_2 = hb[j, 0], hb[j, 1], hb[j, 2]  # of both, along the axes of b
+    sum_a = sum_b = 0.0
+    for k in range(3):
+        u, v, w, half = Ra[i, 0, k], Ra[i, 1, k], Ra[i, 2, k], ha[i, k]
+        dot_0 = abs(u * Rb[j, 0, 0] + v * Rb[j, 1, 0] + w * Rb[j, 2, 0])
+        dot_1 = abs(u * Rb[j, 0, 1] + v * Rb[j, 1, 1] + w * Rb[j, 2, 1])
+        dot_2 = abs(u * Rb[j, 0, 2] + v * Rb[j, 1, 2] + w * Rb[j, 2, 2])
+        wide_0, wide_1, wide_2 = wide_0 + dot_0 * half, wide_1 + dot_1 * half, wide_2 + dot_2 * half
+        wide = half + dot_0 * hb[j, 0] + dot_1 * hb[j, 1] + dot_2 * hb[j, 2]
+        sum_a += max(abs(u * x + v * y + w * z) - wide, 0.0) ** 2
+    for k in range(3):
+        wide = wide_0 if k == 0 else (wide_1 if k == 1 else wide_2)
+        along = Rb[j, 0, k] * x + Rb[j, 1, k] * y + Rb[j, 2, k] * z
+        sum_b += max(abs(along) - wide, 0.0) ** 2
+    return np.sqrt(max(sum_a, sum_b))
+
+
+@njit(cache=True, nogil=True)
+def lower_bounds(ca: Array, Ra: Array, ha: Array, cb: Array, Rb: Array, hb: Array) -> Array:
+    """(n, m) `lower_bound` of all pairs [m]."""
     n, m = ca.shape[0], cb.shape[0]
     bound = np.empty((n, m))
     for i in range(n):
         for j in range(m):
-            sum_a = sum_b = 0.0
-            for k in range(3):
-                at_a = at_b = 0.0
-                wide_a = wide_b = 0.0
-                for x in range(3):
-                    at_a += Ra[i, x, k] * (cb[j, x] - ca[i, x])
-                    at_b += Rb[j, x, k] * (cb[j, x] - ca[i, x])
-                for other in range(3):
-                    dot_a = dot_b = 0.0
-                    for x in range(3):
-                        dot_a += Ra[i, x, k] * Rb[j, x, other]
-                        dot_b += Rb[j, x, k] * Ra[i, x, other]
-                    wide_a += abs(dot_a) * hb[j, other]
-                    wide_b += abs(dot_b) * ha[i, other]
-                gap_a = abs(at_a) - ha[i, k] - wide_a
-                gap_b = abs(at_b) - hb[j, k] - wide_b
-                if gap_a > 0.0:
-                    sum_a += gap_a * gap_a
-                if gap_b > 0.0:
-                    sum_b += gap_b * gap_b
-            bound[i, j] = np.sqrt(max(sum_a, sum_b))
+            bound[i, j] = lower_bound(ca, Ra, ha, i, cb, Rb, hb, j)
     return bound
 
 

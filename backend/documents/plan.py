@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from backend.cspace.joint_image import certified4
@@ -20,6 +22,7 @@ from backend.fusion.crs import SiteFrame
 from backend.machine.kinematics import end_point
 from backend.machine.model import Machine
 from backend.planning.trajectory.carry import goals
+from backend.planning.trajectory.penalty import Iteration
 from backend.planning.trajectory.plan import Method, plan
 from backend.planning.trajectory.records import (
     Cylindrical,
@@ -43,11 +46,13 @@ def plan_document(
     frame: SiteFrame | None,
     where: str = "task",
     site: SiteBodies = NO_SITE_BODIES,
-    method: Method = "toppra",
+    method: Method | None = None,
+    told: Callable[[Iteration], None] | None = None,
 ) -> PlanDocument:
     """A trajectory or why there is none; raises InputError for a task that makes no sense.
 
-    machines: the description of every machine of the state; site: what stands on the site besides.
+    machines: the description of every machine of the state; site: what stands on the site besides;
+    method: the task's when None; told: hears of every step of the penalty method.
     """
     if asked.machine not in machines:
         known = ", ".join(machines)
@@ -61,7 +66,8 @@ def plan_document(
     obstacles = Obstacles(around.boxes, around.names, asked.ground)
     T = body.link_poses[0].copy()
     T[:3, 3] += scene.origin
-    return planned(asked.machine, machine, task, obstacles, T, method)[0]
+    method = asked.method if method is None else method
+    return planned(asked.machine, machine, task, obstacles, T, method, told)[0]
 
 
 def planned(
@@ -71,14 +77,19 @@ def planned(
     obstacles: Obstacles,
     T_frame_root: Array,
     method: Method = "toppra",
+    told: Callable[[Iteration], None] | None = None,
 ) -> tuple[PlanDocument, Trajectory | None]:
     """A task planned, as a document and as what can be followed.
 
-    name: of the machine; T_frame_root: (4, 4) to the frame in which end points are told.
+    name: of the machine; T_frame_root: (4, 4) to the frame in which end points are told; told: of
+    each of the penalty method's iterations.
     """
-    made = plan(machine, task, obstacles, method)
+    made = plan(machine, task, obstacles, method, told)
     document = PlanDocument(
-        ok=isinstance(made, Trajectory), machine=name, method=method, clearance=task.clearance
+        ok=isinstance(made, Trajectory) and not made.violations,
+        machine=name,
+        method=method,
+        clearance=task.clearance,
     )
     if isinstance(made, Refusal):
         made = proven(machine, task, obstacles, made)
@@ -93,6 +104,10 @@ def planned(
         return refused, None
     points = end_point(machine, made.q, T_frame_root)
     checks = made.checks
+    if made.violations:
+        why = f"the {method} method's result is violated: {' '.join(made.violations)}"
+        broken = {"why": why, "kind": "check", "proven": False, "violations": [*made.violations]}
+        document = document.model_copy(update=broken)
     found = document.model_copy(
         update={
             "duration": made.duration,

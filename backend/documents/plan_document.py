@@ -84,6 +84,11 @@ class PlanTaskDocument(Table):
     )
     ground: bool = Field(True, description="the plane under the tracks is an obstacle")
     limits: LimitsDocument = Field(default_factory=LimitsDocument)
+    method: Literal["toppra", "casadi", "penalty"] = Field(
+        "toppra",
+        description="of the timing; penalty: way and timing by Yamashita 2025, (23)-(26), to be "
+        "compared with: it needs all of limits.cylindrical",
+    )
 
 
 class PlanChecks(BaseModel):
@@ -106,13 +111,17 @@ class PlanDocument(BaseModel):
 
     ok: bool
     machine: str
-    method: str = Field(description="of the timing")
+    method: str = Field(description="of the timing, or penalty")
     why: str | None = Field(None, description="there is no trajectory, in words")
     kind: Literal["start", "goal", "blocked", "not found", "tips", "timing", "check"] | None = (
         Field(None, description="of the refusal")
     )
     blockers: list[str] = Field(default_factory=list, description="what is in the way")
     proven: bool | None = Field(None, description="that no trajectory exists")
+    violations: list[str] = Field(
+        default_factory=list,
+        description="of a trajectory that is not ok and only there to be compared with, in words",
+    )
     duration: float | None = Field(None, description="[s]")
     time: list[float] = Field(default_factory=list, description="[s]")
     roles: list[str] = Field(default_factory=list, description="of the columns of joints")

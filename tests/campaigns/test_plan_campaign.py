@@ -11,12 +11,13 @@ from collections import Counter
 
 import numpy as np
 import pytest
-from plan_tasks import judged, random_task
+from plan_tasks import judged
 
 from backend.documents.plan import proven
 from backend.machine.load import load_machine
 from backend.planning.trajectory.plan import plan, rehearse
 from backend.planning.trajectory.records import Refusal
+from cockpit.bench_tasks import random_task
 
 TASKS = int(os.environ.get("PLAN_TASKS", "250"))
 """Of each machine."""

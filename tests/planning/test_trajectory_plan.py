@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from plan_tasks import judged, random_task
+from plan_tasks import judged
 
 from backend.documents.plan import proven
 from backend.errors import InputError
 from backend.machine.kinematics import end_point
 from backend.machine.load import load_machine
 from backend.planning.trajectory.carry import attitude_of, carry_of
-from backend.planning.trajectory.plan import plan
+from backend.planning.trajectory.plan import plan, rehearse
 from backend.planning.trajectory.records import Obstacles, Refusal, Task, Trajectory
 from backend.spatial.boxes import Boxes
+from cockpit.bench_tasks import random_task
 
 MINI = load_machine("mini")
 START = np.array([0.0, 0.6, -1.2, -0.4])
@@ -61,6 +62,11 @@ def test_over_under_and_beside(center: list[float], half: list[float]) -> None:
 def test_random_tasks_judged(seed: int) -> None:
     task, obstacles = random_task(MINI, seed)
     solved(task, obstacles)
+
+
+@pytest.mark.parametrize("name", ["mini", "ex13", "rail6"])
+def test_a_rehearsal_plans_to_the_end(name: str) -> None:
+    assert isinstance(rehearse(load_machine(name)), Trajectory)
 
 
 def test_a_search_is_the_same_every_time() -> None:

@@ -48,6 +48,23 @@ def test_free_is_free_between_samples_and_blocked_is_too_near(seed: int) -> None
         assert nearest < CLEAR + 0.03
 
 
+@pytest.mark.parametrize("seed", range(8))
+def test_every_pair_keeps_its_distance_or_the_named_one_does_not(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    made = make_sweep(MINI, Obstacles(some_boxes(seed), tuple("abcdef"), ground=True), CLEAR)
+    sweep = made.relaxed(START)
+    end = START + rng.uniform(-1, 1, 4) * [2.5, 0.4, 0.5, 0.5]
+    way = START + np.linspace(0.0, 1.0, 400)[:, None] * (end - START)
+    found = np.array([sweep.distances(q) for q in way])
+    hit = sweep.blocked(np.stack([START, end]))
+    if hit is None:
+        assert (found >= sweep.pairs[3]).all()
+        assert (found[[0, -1]] >= sweep.pairs[2]).all()
+    else:
+        named = [k for k, name in enumerate(sweep.names) if name == hit]
+        assert (found < sweep.pairs[2] + 0.01)[:, named].any()
+
+
 def test_some_are_free_and_some_are_not() -> None:
     found = []
     for seed in range(8):

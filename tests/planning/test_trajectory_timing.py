@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 import numpy as np
 import pytest
 
 from backend.errors import InputError
 from backend.machine.load import load_machine
-from backend.planning.trajectory.carry import attitude_of, cylinder, from_cylinder
+from backend.planning.trajectory.carry import attitude_of, cylinder
 from backend.planning.trajectory.curve import Curve, curve_along
 from backend.planning.trajectory.records import Cylindrical, Task
 from backend.planning.trajectory.rows import limit_rows
@@ -18,20 +16,13 @@ from backend.spatial.types import Array
 from backend.stability.masses import mass_model
 from backend.stability.polygon import shrunk, support_polygon
 from backend.stability.zmp import edge_moments
+from cockpit.bench_tasks import lifted_curve
 
 EX13 = load_machine("ex13")
 
 
-def paper_curve(start: float = np.pi / 6, end: float = 5 * np.pi / 6) -> tuple[Task, Curve]:
-    """Yamashita and Kikuuwe 2025: 30 to 150 degrees at 5 m, lifted over something."""
-    where = np.array([[start, 5.0, 1.0], [start, 5.0, 2.5], [end, 5.0, 2.5], [end, 5.0, 1.0]])
-    dense = np.concatenate(
-        [a + np.linspace(0, 1, 30)[:, None] * (b - a) for a, b in pairwise(where)]
-    )
-    q, inside = from_cylinder(EX13, dense, np.full(len(dense), -1.9))
-    assert inside
-    task = Task(q[0], np.zeros(3), payload=1500.0, share=0.2)
-    return task, curve_along(q, 1.0 / EX13.max_velocity, 0.4)
+def paper_curve() -> tuple[Task, Curve]:
+    return lifted_curve()[1:]
 
 
 @pytest.mark.parametrize("share", [0.0, 0.2, 0.45])

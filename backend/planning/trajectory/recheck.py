@@ -58,7 +58,7 @@ def overdone(machine: Machine, task: Task, curve: Curve, time: Timed) -> float:
 
 
 def _by_fcl(machine: Machine, obstacles: Obstacles, q: Array) -> float:
-    """Shortest distance by python-fcl of what moves to the obstacles, in postures (m, n) [m]."""
+    """Shortest distance by python-fcl of what moves to the obstacles, of postures (m, n) [m]."""
     if not len(obstacles.boxes):
         return np.inf
     moving = np.flatnonzero(machine.body_joints.any(axis=1))
@@ -67,7 +67,7 @@ def _by_fcl(machine: Machine, obstacles: Obstacles, q: Array) -> float:
     R = T[..., :3, :3]
     centers = (R @ bodies.centers[:, :, None])[..., 0] + T[..., :3, 3]
     peer = FclScene(obstacles.boxes)
-    return float(peer.least_along(bodies.half_extents, centers, R @ bodies.rotations).min())
+    return peer.least_along(bodies.half_extents, centers, R @ bodies.rotations)
 
 
 def _instants(machine: Machine, curve: Curve, time: Timed) -> Array:

@@ -113,8 +113,10 @@ class Checks:
 
 @dataclass(frozen=True)
 class Trajectory:
-    """time: (m,) [s]; q, rates, accelerations: (m, n); method: of the timing; way: in words how it
-    was found; notes: what was not judged, in words.
+    """time: (m,) [s]; q, rates, accelerations: (m, n); method: of the timing, or penalty; way: in
+    words how it was found; notes: what was not judged, in words; violations: what the re-check
+    found, in words. Only the penalty method's results have any: they are to be compared with, and
+    no machine may follow them.
     """
 
     time: Array
@@ -125,6 +127,7 @@ class Trajectory:
     way: str
     checks: Checks
     notes: tuple[str, ...] = ()
+    violations: tuple[str, ...] = ()
 
     @property
     def duration(self) -> float:

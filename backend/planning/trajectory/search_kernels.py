@@ -5,37 +5,35 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from backend.planning.trajectory.sweep_kernels import Boxed, Chain, Pairs, advance, within
+from backend.planning.trajectory.sweep_kernels import Boxed, Chain, Pairs, blocker, within
 from backend.spatial.types import Array, IntArray
+
+World = tuple[Chain, Boxed, Pairs, tuple[Array, Array]]
+"""Of `sweep_kernels`, and A (n, k), b (n,) of q = A x + b."""
 
 
 @njit(cache=True, nogil=True)
-def free_edge(
-    chain: Chain, boxes: Boxed, pairs: Pairs, turn: tuple[Array, Array], x0: Array, x1: Array
-) -> tuple[float, int, int]:
-    """`advance` from x0 to x1, where q = turn[0] @ x + turn[1]."""
-    return advance(chain, boxes, pairs, turn[0] @ x0 + turn[1], turn[0] @ x1 + turn[1])
+def free_edge(world: World, x0: Array, x1: Array) -> int:
+    """`blocker` from x0 to x1."""
+    chain, boxes, pairs, (A, b) = world
+    return blocker(chain, boxes, pairs, A @ x0 + b, A @ x1 + b)
 
 
 @njit(cache=True, nogil=True)
 def connect(
-    chain: Chain,
-    boxes: Boxed,
-    pairs: Pairs,
-    turn: tuple[Array, Array],
+    world: World,
     ends: tuple[Array, Array],
     room: tuple[Array, Array],
-    weights: Array,
+    metric: tuple[Array, float],
     starts: Array,
     goals: Array,
     draws: Array,
-    longest: float,
     hits: IntArray,
 ) -> Array:
     """(m, k) a free polyline from one of `starts` (a, k) to one of `goals` (b, k); (0, k) if none.
 
-    ends: lower and upper joint values; room: where `draws` (d, k) in 0..1 are spread; weights: (k,)
-    of the metric; longest: of one step in it; hits: (p,) counts what was in the way.
+    ends: lower and upper joint values; room: where `draws` (d, k) in 0..1 are spread; metric: its
+    weights (k,), and the longest step in it; hits: (p,) counts what was in the way.
     """
     count, dim = draws.shape
     size = 2 * count + len(starts) + len(goals) + 2
@@ -44,52 +42,58 @@ def connect(
     used = np.array([len(starts), len(goals)])
     nodes[0, : len(starts)] = starts
     nodes[1, : len(goals)] = goals
-    low, high = ends
+    weights = metric[0]
     for k in range(count):
         a = k % 2
         b = 1 - a
         target = room[0] + draws[k] * (room[1] - room[0])
         near = _nearest(nodes[a], used[a], target, weights)
-        new = _towards(nodes[a, near], target, weights, longest)
-        if not within(turn[0] @ new + turn[1], low, high):
+        new = _grown(world, ends, metric, nodes[a], parent[a], used[a], near, target, hits)
+        if new < 0:
             continue
-        _, hit, _ = free_edge(chain, boxes, pairs, turn, nodes[a, near], new)
-        if hit >= 0:
-            hits[hit] += 1
-            continue
-        if used[a] >= size or used[b] >= size:
-            break
-        nodes[a, used[a]] = new
-        parent[a, used[a]] = near
         used[a] += 1
-        at = _nearest(nodes[b], used[b], new, weights)
-        while used[b] < size:
-            step = _towards(nodes[b, at], new, weights, longest)
-            if not within(turn[0] @ step + turn[1], low, high):
+        target = nodes[a, new]
+        at = _nearest(nodes[b], used[b], target, weights)
+        while True:
+            at = _grown(world, ends, metric, nodes[b], parent[b], used[b], at, target, hits)
+            if at < 0:
                 break
-            _, hit, _ = free_edge(chain, boxes, pairs, turn, nodes[b, at], step)
-            if hit >= 0:
-                hits[hit] += 1
-                break
-            nodes[b, used[b]] = step
-            parent[b, used[b]] = at
-            at = used[b]
             used[b] += 1
-            if np.abs(step - new).max() == 0.0:
-                return _joined(nodes, parent, used[a] - 1, at, a)
+            if np.abs(nodes[b, at] - target).max() == 0.0:
+                return _joined(nodes, parent, new, at, a)
     return np.empty((0, dim))
 
 
 @njit(cache=True, nogil=True)
-def shorten(
-    chain: Chain,
-    boxes: Boxed,
-    pairs: Pairs,
-    turn: tuple[Array, Array],
-    weights: Array,
-    path: Array,
-    draws: Array,
-) -> Array:
+def _grown(
+    world: World,
+    ends: tuple[Array, Array],
+    metric: tuple[Array, float],
+    nodes: Array,
+    parent: IntArray,
+    used: int,
+    near: int,
+    target: Array,
+    hits: IntArray,
+) -> int:
+    """The new node of a tree, its first `used` of `nodes` taken, one step from node `near` towards
+    `target`; -1 where something is in the way, which is counted, or no room is left.
+    """
+    A, b = world[3]
+    step = _towards(nodes[near], target, metric[0], metric[1])
+    if used >= len(nodes) or not within(A @ step + b, ends[0], ends[1]):
+        return -1
+    hit = free_edge(world, nodes[near], step)
+    if hit >= 0:
+        hits[hit] += 1
+        return -1
+    nodes[used] = step
+    parent[used] = near
+    return used
+
+
+@njit(cache=True, nogil=True)
+def shorten(world: World, weights: Array, path: Array, draws: Array) -> Array:
     """The polyline (m, k) after short cuts between points drawn along it; draws: (d, 2) in 0..1."""
     now = path.copy()
     for k in range(len(draws)):
@@ -104,12 +108,10 @@ def shorten(
         j = min(np.searchsorted(along, v, side="right") - 1, len(now) - 2)
         if j <= i:
             continue
-        p = now[i] + (u - along[i]) / max(along[i + 1] - along[i], 1e-300) * (now[i + 1] - now[i])
-        r = now[j] + (v - along[j]) / max(along[j + 1] - along[j], 1e-300) * (now[j + 1] - now[j])
+        p, r = _between(now, along, i, u), _between(now, along, j, v)
         if _far(p, r, weights) > v - u - 1e-6:
             continue
-        _, hit, _ = free_edge(chain, boxes, pairs, turn, p, r)
-        if hit >= 0:
+        if free_edge(world, p, r) >= 0:
             continue
         shorter = np.empty((i + 1 + 2 + len(now) - 1 - j, now.shape[1]))
         shorter[: i + 1] = now[: i + 1]
@@ -121,20 +123,32 @@ def shorten(
 
 
 @njit(cache=True, nogil=True)
+def _between(path: Array, along: Array, i: int, s: float) -> Array:
+    """The point of a polyline's i-th leg at s, lengths `along` (m,) it."""
+    share = (s - along[i]) / max(along[i + 1] - along[i], 1e-300)
+    return path[i] + share * (path[i + 1] - path[i])
+
+
+@njit(cache=True, nogil=True)
 def _far(a: Array, b: Array, weights: Array) -> float:
+    return np.sqrt(_square(a, b, weights))
+
+
+@njit(cache=True, nogil=True)
+def _square(a: Array, b: Array, weights: Array) -> float:
     square = 0.0
     for k in range(len(weights)):
         square += (weights[k] * (a[k] - b[k])) ** 2
-    return np.sqrt(square)
+    return square
 
 
 @njit(cache=True, nogil=True)
 def _nearest(nodes: Array, used: int, x: Array, weights: Array) -> int:
     best, at = np.inf, 0
     for i in range(used):
-        d = _far(nodes[i], x, weights)
-        if d < best:
-            best, at = d, i
+        square = _square(nodes[i], x, weights)
+        if square < best:
+            best, at = square, i
     return at
 
 

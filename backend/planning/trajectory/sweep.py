@@ -67,7 +67,7 @@ class Sweep:
         nearer than its distance at the samples, or 0.8 of that between them.
         """
         for a, b in pairwise(points):
-            _, pair, _ = sweep_kernels.advance(
+            pair = sweep_kernels.blocker(
                 self.chain, self.boxes, self.pairs, np.ascontiguousarray(a), np.ascontiguousarray(b)
             )
             if pair >= 0:

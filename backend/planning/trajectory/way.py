@@ -105,21 +105,20 @@ def search(
     high[0] = min(high[0], both[:, 0].max() + 1.0)
     weights = 1.0 / np.append(machine.max_velocity[:3], machine.max_velocity[3])
     rng = np.random.default_rng(seed)
-    asked = (sweep.chain, sweep.boxes, sweep.pairs, (carry.A, carry.b))
+    world = (sweep.chain, sweep.boxes, sweep.pairs, (carry.A, carry.b))
     path = search_kernels.connect(
-        *asked,
+        world,
         (machine.lower, machine.upper),
         (low, high),
-        weights,
+        (weights, _LONGEST),
         np.ascontiguousarray(start[None]),
         np.ascontiguousarray(ends),
         rng.random((draws, 4)),
-        _LONGEST,
         hits,
     )
     if not len(path):
         return np.zeros((0, len(task.q)))
-    path = search_kernels.shorten(*asked, weights, path, rng.random((_CUTS, 2)))
+    path = search_kernels.shorten(world, weights, path, rng.random((_CUTS, 2)))
     return carry.q(path)
 
 
