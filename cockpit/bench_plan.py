@@ -11,7 +11,7 @@ import numpy as np
 
 from backend.collision.peer import FclScene
 from backend.documents.bench import BenchRow
-from backend.machine.kinematics import body_boxes, link_poses
+from backend.machine.kinematics import link_poses
 from backend.machine.load import load_machine
 from backend.planning.trajectory.course import course, setting
 from backend.planning.trajectory.plan import plan, rehearse, timing
@@ -103,6 +103,7 @@ def _check_rows(
     """The nearest along a trajectory, as the check finds it, and python-fcl in every place."""
     machine = load_machine("ex13")
     moving = np.flatnonzero(machine.body_joints.any(axis=1))
+    frames = machine.body_link_index[moving]
     ours, theirs, off = list[float](), list[float](), list[float]()
     for (_, obstacles), one in zip(tasks, made, strict=True):
         if len(ours) == _CHECKED:
@@ -111,13 +112,10 @@ def _check_rows(
             continue
         places = np.linspace(0.0, one.duration, _PLACES)
         q = np.stack([np.interp(places, one.time, column) for column in one.q.T], axis=1)
-        at = [body_boxes(machine, T).take(moving) for T in link_poses(machine, q)]
-        half = at[0].half_extents
-        centers = np.stack([boxes.centers for boxes in at])
-        turns = np.stack([boxes.rotations for boxes in at])
+        asked = (machine.bodies.take(moving), frames, link_poses(machine, q))
         scene = FclScene(obstacles.boxes)
-        least = _timed(ours, scene.least_along, half, centers, turns)
-        every = _timed(theirs, scene.each_along, half, centers, turns)
+        least = _timed(ours, scene.least_along, *asked)
+        every = _timed(theirs, scene.each_along, *asked)
         off.append(1e3 * abs(least - every.min()))
     row = _row(f"python-fcl's nearest of {_PLACES} postures, ex13", 1e3 * np.array(ours), "ms")
     value = 1e3 * float(np.median(theirs))

@@ -13,7 +13,7 @@ import numpy as np
 
 from backend.machine.model import Machine
 from backend.spatial.types import Array, BoolArray
-from backend.stability.dynamics import down, wrench_of
+from backend.stability.dynamics import down, rest_wrench, wrench_of
 from backend.stability.masses import MassModel
 from backend.stability.polygon import Polygon
 from backend.stability.zmp import moments_of, share, zmp_of
@@ -90,8 +90,7 @@ def brings_home(
     n = len(q)
     nudge = _NUDGE * np.eye(n)
     tried = np.concatenate([q[None], q - nudge, q + nudge])
-    still = np.zeros_like(tried)
-    left = share(zmp_of(wrench_of(model, tried, still, still, down(T_site_root))), support)
+    left = share(zmp_of(rest_wrench(model, tried, T_site_root)), support)
     return np.asarray((left[1:] > left[0] + 1e-9).reshape(2, n).T)
 
 

@@ -17,7 +17,7 @@ from backend.machine.model import Machine
 from backend.machine.sun_map import sun_angles
 from backend.spatial import transform
 from backend.spatial.types import Array
-from backend.stability.dynamics import down, wrench_of
+from backend.stability.dynamics import rest_wrench
 from backend.stability.masses import MassModel, mass_model
 from backend.stability.polygon import Polygon, shrunk
 from backend.stability.zmp import moments_of
@@ -149,5 +149,4 @@ def holding_reach(
 
 
 def _static(model: MassModel, support: Polygon, q: Array, T_site_root: Array | None) -> Array:
-    still = np.zeros(np.shape(q))
-    return moments_of(wrench_of(model, q, still, still, down(T_site_root)), support)
+    return moments_of(rest_wrench(model, q, T_site_root), support)

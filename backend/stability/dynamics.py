@@ -92,6 +92,12 @@ def wrench_of(model: MassModel, q: Array, qd: Array, qdd: Array, g: Array) -> Wr
     return Wrench(out[..., :3], out[..., 3:])
 
 
+def rest_wrench(model: MassModel, q: Array, T_site_root: Array | None = None) -> Wrench:
+    """What the ground must give at rest in q (..., n) [rad]; T_site_root: level when None."""
+    still = np.zeros(np.shape(q))
+    return wrench_of(model, q, still, still, down(T_site_root))
+
+
 def _rows(values: Array, batch: tuple[int, ...], width: int) -> Array:
     """An own copy, never read-only: each mix of those would be compiled anew, in a live cycle."""
     rows = np.empty((*batch, width))

@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from backend.spatial.types import Array
-from backend.stability.dynamics import Wrench, down, ground_wrench, wrench_of
+from backend.stability.dynamics import Wrench, ground_wrench, rest_wrench, wrench_of
 from backend.stability.masses import MassModel
 from backend.stability.polygon import Polygon
 
@@ -23,13 +23,12 @@ def zmp(
     qd: Array,
     qdd: Array,
     T_site_root: Array | None = None,
-    base_acceleration: Array | None = None,
 ) -> Array:
     """(..., 2) in the root frame [m]; NaN where nothing presses the machine to the ground.
 
-    The arguments are those of `ground_wrench`.
+    The arguments are those of `ground_wrench`; the base stands.
     """
-    return zmp_of(ground_wrench(model, q, qd, qdd, T_site_root, base_acceleration))
+    return zmp_of(ground_wrench(model, q, qd, qdd, T_site_root))
 
 
 def zmp_of(wrench: Wrench) -> Array:
@@ -76,13 +75,12 @@ def edge_moments(
     qd: Array,
     qdd: Array,
     T_site_root: Array | None = None,
-    base_acceleration: Array | None = None,
 ) -> Array:
     """(..., k) about each edge [N m], >= 0 where the machine does not tip over that edge.
 
-    The arguments are those of `ground_wrench`.
+    The arguments are those of `ground_wrench`; the base stands.
     """
-    return moments_of(ground_wrench(model, q, qd, qdd, T_site_root, base_acceleration), support)
+    return moments_of(ground_wrench(model, q, qd, qdd, T_site_root), support)
 
 
 def edge_moment_terms(
@@ -102,5 +100,5 @@ def edge_moment_terms(
     nothing, still = np.zeros(3), np.zeros_like(first)
     a = wrench_of(model, q, still, first, nothing)
     b = wrench_of(model, q, first, second, nothing)
-    c = wrench_of(model, q, still, still, down(T_site_root))
+    c = rest_wrench(model, q, T_site_root)
     return moments_of(a, support), moments_of(b, support), moments_of(c, support)

@@ -23,40 +23,45 @@ def some(rng: np.random.Generator, count: int, spread: float) -> Boxes:
     )
 
 
-def moving(seed: int, places: int) -> tuple[Array, Array, Array]:
-    """Half extents (b, 3), centers (m, b, 3), rotations (m, b, 3, 3) along a random motion."""
+def moving(seed: int, places: int) -> Array:
+    """(m, links, 4, 4) along a random motion."""
     rng = np.random.default_rng(seed)
     a, b = (rng.uniform(-1.5, 1.5, 4) for _ in range(2))
-    q = a + np.linspace(0.0, 1.0, places)[:, None] * (b - a)
-    at = [body_boxes(MINI, T) for T in link_poses(MINI, q)]
-    return (
-        at[0].half_extents,
-        np.stack([boxes.centers for boxes in at]),
-        np.stack([boxes.rotations for boxes in at]),
-    )
+    return link_poses(MINI, a + np.linspace(0.0, 1.0, places)[:, None] * (b - a))
 
 
 @pytest.mark.parametrize("seed", range(6))
 def test_least_along_a_motion_is_that_of_every_place(seed: int) -> None:
     scene = FclScene(some(np.random.default_rng(seed), 12, 6.0))
-    half, centers, rotations = moving(seed, 150)
-    every = [
-        scene.by_manager(Boxes(c, R, half)).min() for c, R in zip(centers, rotations, strict=True)
-    ]
-    least = scene.least_along(half, centers, rotations)
-    assert least == pytest.approx(min(every), abs=1e-9)
-    np.testing.assert_allclose(scene.each_along(half, centers, rotations), every, atol=1e-9)
+    T = moving(seed, 150)
+    every = [scene.by_manager(body_boxes(MINI, one)).min() for one in T]
+    asked = (MINI.bodies, MINI.body_link_index, T)
+    assert scene.least_along(*asked) == pytest.approx(min(every), abs=1e-9)
+    np.testing.assert_allclose(scene.each_along(*asked), every, atol=1e-9)
 
 
 def test_a_moment_of_contact_between_far_ends_is_found() -> None:
     half = np.array([[0.1, 0.1, 0.1]])
     scene = FclScene(Boxes(np.array([[0.0, 0.25, 0.0]]), np.eye(3)[None], half))
-    x = np.linspace(-5.0, 5.0, 400)
-    centers = np.stack([x, 0 * x, 0 * x], axis=1)[:, None]
-    rotations = np.broadcast_to(np.eye(3), (400, 1, 3, 3))
-    assert scene.least_along(half, centers, rotations) == pytest.approx(0.05, abs=1e-6)
-    assert scene.least_along(2.0 * half, centers, rotations) == 0.0
-    assert scene.least_along(half, centers[:1], rotations[:1]) > 4.0
+    T = np.tile(np.eye(4), (400, 1, 1, 1))
+    T[:, 0, 0, 3] = np.linspace(-5.0, 5.0, 400)
+    small, large = (Boxes(np.zeros((1, 3)), np.eye(3)[None], k * half) for k in (1.0, 2.0))
+    frames = np.zeros(1, np.int64)
+    assert scene.least_along(small, frames, T) == pytest.approx(0.05, abs=1e-6)
+    assert scene.least_along(large, frames, T) == 0.0
+    assert scene.least_along(small, frames, T[:1]) > 4.0
+
+
+@pytest.mark.parametrize("turn", [0.002, 0.5])
+def test_a_long_box_that_turns_about_its_middle_is_found_where_its_end_passes(turn: float) -> None:
+    scene = FclScene(Boxes(np.array([[0.0, 3.2, 0.0]]), np.eye(3)[None], np.full((1, 3), 0.1)))
+    angles = np.arange(0.0, np.pi, turn)
+    T = np.tile(np.eye(4), (len(angles), 1, 1, 1))
+    T[:, 0, :3, :3] = rotation.rz(angles)
+    box = Boxes(np.zeros((1, 3)), np.eye(3)[None], np.array([[3.0, 0.05, 0.05]]))
+    every = [scene.by_manager(Boxes(box.centers, R, box.half_extents)) for R in T[..., :3, :3]]
+    least = scene.least_along(box, np.zeros(1, np.int64), T)
+    assert least == pytest.approx(float(np.min(every)), abs=1e-9)
 
 
 def test_a_lower_bound_is_never_above_the_distance() -> None:

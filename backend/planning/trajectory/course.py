@@ -14,7 +14,7 @@ from backend.planning.trajectory.records import Obstacles, Refusal, Task
 from backend.planning.trajectory.sweep import CONTACT, Sweep, make_sweep
 from backend.planning.trajectory.way import Way, find_way
 from backend.spatial.types import Array
-from backend.stability.dynamics import down, wrench_of
+from backend.stability.dynamics import rest_wrench
 from backend.stability.masses import MassModel, mass_model, why_unknown
 from backend.stability.polygon import Polygon, shrunk, support_polygon
 from backend.stability.zmp import moments_of
@@ -97,8 +97,7 @@ def stands(masses: MassModel | None, support: Polygon, task: Task, q: Array) -> 
 
 
 def _at_rest(masses: MassModel, support: Polygon, task: Task, q: Array) -> Array:
-    still = np.zeros_like(q)
-    return moments_of(wrench_of(masses, q, still, still, down(task.T_site_root)), support)
+    return moments_of(rest_wrench(masses, q, task.T_site_root), support)
 
 
 def _tips(where: str, masses: MassModel | None, support: Polygon, task: Task, q: Array) -> str:

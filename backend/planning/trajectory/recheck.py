@@ -62,12 +62,10 @@ def _by_fcl(machine: Machine, obstacles: Obstacles, q: Array) -> float:
     if not len(obstacles.boxes):
         return np.inf
     moving = np.flatnonzero(machine.body_joints.any(axis=1))
-    bodies = machine.bodies.take(moving)
-    T = link_poses(machine, q)[:, machine.body_link_index[moving]]
-    R = T[..., :3, :3]
-    centers = (R @ bodies.centers[:, :, None])[..., 0] + T[..., :3, 3]
-    peer = FclScene(obstacles.boxes)
-    return peer.least_along(bodies.half_extents, centers, R @ bodies.rotations)
+    frames = machine.body_link_index[moving]
+    return FclScene(obstacles.boxes).least_along(
+        machine.bodies.take(moving), frames, link_poses(machine, q)
+    )
 
 
 def _instants(machine: Machine, curve: Curve, time: Timed) -> Array:
