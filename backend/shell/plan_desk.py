@@ -155,7 +155,7 @@ class PlanDesk:
         """Why a plan that is followed must not be any more; empty while it may."""
         found = self._of(machine, plan)
         if isinstance(found, str):
-            return found
+            return "the plan was dropped"
         return found.why if found.state in ("void", "none") else ""
 
     def document(self) -> dict[str, Any]:

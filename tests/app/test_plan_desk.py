@@ -326,7 +326,7 @@ def test_followed_no_other_is_planned_until_it_is_dropped(live: Live) -> None:
     with pytest.raises(InputError, match="is being followed; drop it first"):
         live.desk.start(asked(), "bob")
     live.desk.drop("a", "bob")
-    assert "not on offer" in live.desk.over("a", found["plan"])
+    assert live.desk.over("a", found["plan"]) == "the plan was dropped"
     assert "a" not in live.desk.document()
 
 
