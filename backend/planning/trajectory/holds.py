@@ -54,7 +54,7 @@ def broken(
     sweep = replace(sweep, pairs=(*sweep.pairs[:2], clear, clear * 0.8, sweep.pairs[4]))
     q = np.ascontiguousarray(q)
     for row in range(max(len(q) - 1, 1)):
-        _, pair, _ = sweep_kernels.advance(
+        pair = sweep_kernels.blocker(
             sweep.chain, sweep.boxes, sweep.pairs, q[row], q[min(row + 1, len(q) - 1)]
         )
         if pair >= 0:
