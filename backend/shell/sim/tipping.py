@@ -18,9 +18,10 @@ from backend.machine.model import Machine
 from backend.shell.sim.dynamics import SimState
 from backend.spatial import rotation, transform
 from backend.spatial.types import Array
+from backend.stability.dynamics import ground_wrench
 from backend.stability.masses import MassModel, mass_model, why_unknown
 from backend.stability.polygon import Polygon, support_polygon
-from backend.stability.zmp import edge_moments
+from backend.stability.zmp import moments_of
 
 TIPPING, TOLD = "tipping", math.radians(0.5)
 """What an agent calls it, and from what angle on [rad]."""
@@ -72,9 +73,8 @@ def tip(lean: Lean, before: SimState, after: SimState, stance: Stance, dt: float
     T = after.T_site_root if lean.edge < 0 else after.T_site_root @ _turned(stance, lean)
     accelerations = (after.qd - before.qd) / dt
     pushed = np.array([float((after.travel - before.travel).mean()) / dt, 0.0, 0.0])
-    moments = edge_moments(
-        *(stance.model, stance.support, after.q, after.qd, accelerations, T, pushed)
-    )
+    wrench = ground_wrench(stance.model, after.q, after.qd, accelerations, T, pushed)
+    moments = moments_of(wrench, stance.support)
     edge = lean.edge if lean.edge >= 0 else int(np.argmin(moments))
     if lean.edge < 0 and moments[edge] >= 0.0:
         return UPRIGHT
