@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,6 +21,7 @@ from backend.pipeline.people import everybody, lost_boxes
 from backend.pipeline.records import Snapshot
 from backend.pipeline.surroundings import surroundings, why_unknown
 from backend.pipeline.working_gauge import site_of
+from backend.planning.trajectory.announced import passed
 from backend.planning.trajectory.carry import attitude_of
 from backend.planning.trajectory.records import Obstacles, Task
 from backend.safety.people import Watch
@@ -47,8 +51,22 @@ class LiveTask:
     goal: Array | None
 
 
-def live_task(asked: PlanRequest, snapshot: Snapshot, config: Config) -> LiveTask:
-    """Raises InputError for what makes no sense, and while anything is not known that counts."""
+class Announced(NamedTuple):
+    """What another machine is about to do: joints (m, n) [rad] from now on; T_site_root: (4, 4)."""
+
+    joints: Array
+    T_site_root: Array
+
+
+def live_task(
+    asked: PlanRequest,
+    snapshot: Snapshot,
+    config: Config,
+    announced: Mapping[str, Announced] = MappingProxyType({}),
+) -> LiveTask:
+    """announced: trajectories of other machines, by name: all that they pass is kept clear of.
+
+    Raises InputError for what makes no sense, and while anything is not known that counts."""
     name = asked.machine
     if name not in config.own:
         raise InputError(f'machine is "{name}"; allowed are {", ".join(config.own)}.')
@@ -90,6 +108,11 @@ def live_task(asked: PlanRequest, snapshot: Snapshot, config: Config) -> LiveTas
         T_site_root=T_site_root,
     )
     obstacles = obstacles_of(name, snapshot, config, asked.ground)
+    for other, way in announced.items():
+        taken = passed(config.machines[other], way.joints, way.T_site_root).moved(T_root_site)
+        boxes = concatenated([obstacles.boxes, taken])
+        names = *obstacles.names, *(f"{other}:trajectory",) * len(taken)
+        obstacles = replace(obstacles, boxes=boxes, names=names)
     return LiveTask(name, snapshot.time, task, obstacles, T_site_root, keep, goal)
 
 

@@ -19,7 +19,7 @@ import numpy as np
 from backend.control.follow import NEAR, Trajectory
 from backend.documents.plan_document import PlanDocument
 from backend.documents.plan_figures import series
-from backend.documents.plan_live import LiveTask, kept, live_task, obstacles_of, unknown
+from backend.documents.plan_live import Announced, LiveTask, kept, live_task, obstacles_of, unknown
 from backend.documents.plan_state import PlanRequest
 from backend.errors import InputError
 from backend.machine.model import Machine
@@ -119,7 +119,7 @@ class PlanDesk:
         snapshot = self._latest()
         if snapshot is None:
             raise InputError("no cycle has finished yet; try again.")
-        live = live_task(asked, snapshot, self._config)
+        live = live_task(asked, snapshot, self._config, self._announced(asked.machine))
         progress = self._followed(asked.machine)
         if progress is not None and not progress.ended:
             raise InputError(f"{progress.plan} is being followed; drop it first.")
@@ -304,6 +304,21 @@ class PlanDesk:
             log.error("%s: %s", plan.name, error)
             return "unknown", f"it cannot be held against the scene: {error}"
         return ("void", f"{found} is in its way now") if found else ("offered", "")
+
+    def _announced(self, machine: str) -> dict[str, Announced]:
+        """What is on offer or followed with the other machines, from where it is now."""
+        with self._lock:
+            plans = {k: plan for k, plan in self._plans.items() if k != machine}
+        found = {}
+        for other, plan in plans.items():
+            made = None if plan.answer is None else plan.answer.trajectory
+            if plan.state not in LIVING or made is None:
+                continue
+            progress = self._followed(other)
+            at = progress.at if progress is not None and progress.plan == plan.name else 0.0
+            first = max(int(np.searchsorted(made.times, at, side="right")) - 1, 0)
+            found[other] = Announced(made.joints[first:], plan.live.T_site_root)
+        return found
 
     def _keep(self, before: Plan, after: Plan) -> None:
         """Unless it was dropped, or another was asked for meanwhile."""

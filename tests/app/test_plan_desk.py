@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from fastapi import FastAPI
 
+from backend.collision.closest import closest_pairs
 from backend.control.follow import ARRIVED, Trajectory
 from backend.documents.plan_document import PlanDocument
 from backend.documents.plan_figures import FollowedSeries
@@ -23,14 +24,15 @@ from backend.errors import InputError
 from backend.fusion.inflation import spread
 from backend.fusion.pose import FusedPose, Validity
 from backend.fusion.samples import Fix
-from backend.machine.kinematics import end_point
+from backend.machine.kinematics import body_boxes, end_point, link_poses
 from backend.machine.load import load_machine
 from backend.pipeline.config import Config
 from backend.pipeline.people_records import Missing, People
 from backend.pipeline.place import base_transform, place
 from backend.pipeline.records import Health, MachineState, PairDistance, Snapshot
 from backend.planning.trajectory.holds import broken, nearest
-from backend.planning.trajectory.records import Obstacles
+from backend.planning.trajectory.plan import plan as trajectory
+from backend.planning.trajectory.records import Obstacles, Refusal
 from backend.safety.partner import Limits
 from backend.safety.people import Watch
 from backend.shell.app.plan_api import plan_router
@@ -350,6 +352,37 @@ def url(live: Live) -> Iterator[str]:
     web.start()
     yield f"http://127.0.0.1:{web.port}/api/plan"
     web.stop()
+
+
+def apart(q: np.ndarray, T: np.ndarray, other: np.ndarray, T_other: np.ndarray) -> float:
+    """The shortest distance of any posture of one from any posture of the other [m]."""
+    ones = [body_boxes(MINI, link_poses(MINI, one, T)) for one in q]
+    others = [body_boxes(MINI, link_poses(MINI, one, T_other)) for one in other]
+    return float(min(closest_pairs(a, b).distance[0] for a in ones for b in others))
+
+
+def test_one_machine_keeps_clear_of_what_the_other_has_announced(live: Live) -> None:
+    first = live.plan()
+    live.snapshot = scene(b=state("b", (4.6, 3.4), math.pi, q=[1.9, *START[1:]]))
+    goal = {"machine": "b", "goal": {"joints": {"swing": -0.5}}, "clearance": 0.1}
+    live.desk.start(PlanRequest.model_validate(goal), "bob")
+    deadline = time.monotonic() + 120.0
+    while (second := live.of("b"))["state"] not in ("offered", "none"):
+        assert time.monotonic() < deadline, second
+        time.sleep(0.05)
+    ways = {}
+    for name, plan in (("a", first), ("b", second)):
+        way = live.desk.way(name, plan["plan"])
+        assert way is not None, plan
+        ways[name] = np.array(way[0].joints[::5]), way[1]
+    # At no two moments of either do they come near: they may be followed at the same time.
+    assert apart(*ways["a"], *ways["b"]) >= second["clearance"] - 1e-6
+    # Had it not been announced, they would.
+    alone = live_task(PlanRequest.model_validate(goal), live.snapshot, CONFIG)
+    made = trajectory(MINI, alone.task, alone.obstacles)
+    assert not isinstance(made, Refusal)
+    assert apart(*ways["a"], made.q[::5], ways["b"][1]) < second["clearance"] - 0.1
+    live.desk.drop("b", "bob")
 
 
 def test_the_api_says_it_all(url: str, live: Live) -> None:
