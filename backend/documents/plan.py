@@ -120,6 +120,7 @@ def planned(
             "checks": PlanChecks(
                 min_clearance=_finite(checks.min_clearance),
                 min_own_clearance=_finite(checks.min_own),
+                min_ground_clearance=_finite(checks.min_ground),
                 min_stability_margin=_finite(checks.min_stability_margin),
                 worst_rate=checks.worst_rate,
                 worst_acceleration=checks.worst_acceleration,

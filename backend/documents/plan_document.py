@@ -98,6 +98,9 @@ class PlanChecks(BaseModel):
         description="to obstacles, the ground aside; null where none is in reach [m]"
     )
     min_own_clearance: float | None = Field(description="of the machine's own bodies [m]")
+    min_ground_clearance: float | None = Field(
+        description="of what moves to the ground; null where that is no obstacle [m]"
+    )
     min_stability_margin: float | None = Field(
         description="zero-moment point to the tracks' edge; null where masses are unknown [m]"
     )

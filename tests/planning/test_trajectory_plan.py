@@ -11,9 +11,15 @@ from backend.errors import InputError
 from backend.machine.kinematics import end_point
 from backend.machine.load import load_machine
 from backend.planning.trajectory.carry import attitude_of, carry_of
+from backend.planning.trajectory.curve import curve_along
 from backend.planning.trajectory.plan import plan, rehearse
+from backend.planning.trajectory.recheck import recheck
 from backend.planning.trajectory.records import Obstacles, Refusal, Task, Trajectory
+from backend.planning.trajectory.rows import limit_rows
+from backend.planning.trajectory.sweep import make_sweep
+from backend.planning.trajectory.timing import toppra_timing
 from backend.spatial.boxes import Boxes
+from backend.stability.polygon import support_polygon
 from cockpit.bench_tasks import random_task
 
 MINI = load_machine("mini")
@@ -62,6 +68,21 @@ def test_over_under_and_beside(center: list[float], half: list[float]) -> None:
 def test_random_tasks_judged(seed: int) -> None:
     task, obstacles = random_task(MINI, seed)
     solved(task, obstacles)
+
+
+def test_the_check_alone_notices_a_way_through_the_ground() -> None:
+    low = START.copy()
+    low[1] = -0.6
+    task = Task(START, end_point(MINI, low))
+    curve = curve_along(np.stack([START, low]), 1.0 / MINI.max_velocity, 0.3)
+    rows = limit_rows(MINI, task, curve, 160, None, support_polygon(MINI))
+    time = toppra_timing(rows)
+    assert time is not None
+    for ground in (True, False):
+        obstacles = Obstacles(ground=ground)
+        sweep = make_sweep(MINI, obstacles, task.clearance)
+        checks = recheck(MINI, task, obstacles, sweep, curve, time, None, support_polygon(MINI))
+        assert (checks.min_ground < 0.0) == ground
 
 
 @pytest.mark.parametrize("name", ["mini", "ex13", "rail6"])

@@ -126,6 +126,8 @@ def _broken(within: Setting, checks: Checks) -> list[str]:
     found = []
     if checks.min_clearance < within.sweep.kept - 1e-6 or checks.min_own <= 0.0:
         found.append("the re-check found the way nearer to something than it was planned.")
+    if checks.min_ground <= 0.0:
+        found.append("the re-check found the machine to touch the ground.")
     if checks.min_stability_margin <= 0.0:
         found.append("the re-check found the machine to tip over.")
     if max(checks.worst_rate, checks.worst_acceleration) > 1.001:

@@ -38,10 +38,11 @@ def recheck(
     if masses is not None:
         point = zmp(masses, q, rates, accelerations, task.T_site_root)
         stable = float(margin(point, support).min())
-    own, outer = sweep.least_along(q)
+    own, outer, ground = sweep.least_along(q)
     return Checks(
         min_clearance=min(outer, _by_fcl(machine, obstacles, q)),
         min_own=own,
+        min_ground=ground,
         min_stability_margin=stable,
         worst_rate=float((np.abs(rates) / task.max_velocity(machine)).max()),
         worst_acceleration=float((np.abs(accelerations) / task.max_acceleration(machine)).max()),

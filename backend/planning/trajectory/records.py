@@ -98,13 +98,16 @@ class Task:
 @dataclass(frozen=True)
 class Checks:
     """Judged apart from what planned: min_clearance: to obstacles by python-fcl at dense samples
-    [m], infinite where there are none; min_own: of the machine's own bodies [m];
-    min_stability_margin: of the full ZMP to the support polygon's edge [m], NaN where the masses
-    are not known; worst_rate, worst_acceleration: shares of the joints' limits; samples: judged.
+    [m], infinite where there are none; min_own: of the machine's own bodies [m]; min_ground: of
+    what moves to the ground, infinite where that is no obstacle, only the sign counts where it
+    touches [m]; min_stability_margin: of the full ZMP to the support polygon's edge [m], NaN where
+    the masses are not known; worst_rate, worst_acceleration: shares of the joints' limits; samples:
+    judged.
     """
 
     min_clearance: float
     min_own: float
+    min_ground: float
     min_stability_margin: float
     worst_rate: float
     worst_acceleration: float

@@ -91,6 +91,7 @@ def answer(machine: Machine, task: Task, within: Setting, found: Descent) -> Ans
     found = found.done()
     q, reachable = _joints(machine, task, within, found.place)
     q[0] = task.q
+    reachable &= bool((q >= machine.lower - 1e-6).all() and (q <= machine.upper + 1e-6).all())
     curve = Curve(make_interp_spline(found.t, q, k=3), float(found.t[-1]))
     ones = np.ones_like(found.t)
     time = Timed(found.t, found.t, ones, np.zeros(len(ones) - 1))

@@ -50,17 +50,17 @@ class Sweep:
             found[self.names[p]] = min(float(d[p]), found.get(self.names[p], np.inf))
         return sorted((distance, name) for name, distance in found.items())
 
-    def least_along(self, q: Array) -> tuple[float, float]:
-        """Shortest distances in postures (m, n): of own bodies to each other, and to obstacles, the
-        ground not counted; infinite where there are none [m].
+    def least_along(self, q: Array) -> tuple[float, float, float]:
+        """Shortest distances in postures (m, n): of own bodies to each other, to obstacles, and to
+        the ground; infinite where there are none [m].
         """
         kinds = np.array([0 if name.startswith("its own") else 1 for name in self.names])
-        kinds[[name == THE_GROUND for name in self.names]] = -1
-        least = np.full(2, np.inf)
+        kinds[[name == THE_GROUND for name in self.names]] = 2
+        least = np.full(3, np.inf)
         sweep_kernels.least_along(
             self.chain, self.boxes, self.pairs, kinds, np.ascontiguousarray(q), least
         )
-        return float(least[0]), float(least[1])
+        return float(least[0]), float(least[1]), float(least[2])
 
     def blocked(self, points: Array) -> str | None:
         """What is in the way along the polyline (m, n), None where all of it is free: no pair comes

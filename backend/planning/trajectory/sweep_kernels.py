@@ -58,7 +58,7 @@ def least_along(
 ) -> None:
     """Lowers least (k,) to the shortest signed distance of pairs of each kind in postures (m, n).
 
-    kinds: (p,) index into least, -1 where a pair is left out [m].
+    kinds: (p,) index into least [m].
     """
     C, R, H = boxes[0].copy(), boxes[1].copy(), boxes[2]
     radius = boxes[3]
@@ -66,8 +66,6 @@ def least_along(
         place(chain, boxes, postures[m], C, R)
         for p in range(len(kinds)):
             k = kinds[p]
-            if k < 0:
-                continue
             i, j = pairs[0][p], pairs[1][p]
             if _spheres(C, i, j, radius[i] + radius[j]) >= least[k]:
                 continue
