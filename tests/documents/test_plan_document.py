@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,6 +15,7 @@ from backend.errors import InputError
 from backend.machine.load import load_machine
 from backend.planning.trajectory.penalty import Iteration
 from cockpit.bench_tasks import paper_task
+from cockpit.plan import run_plan
 
 
 def task(**more: Any) -> dict[str, Any]:
@@ -89,6 +92,19 @@ def test_ours_passes_over_the_same_post() -> None:
     assert made.checks is not None
     assert made.checks.min_clearance is not None
     assert made.checks.min_clearance > 0.07
+
+
+def test_the_command_lines_method_goes_before_the_tasks(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "task.json"
+    path.write_text(json.dumps(task(method="penalty")))
+    run_plan(path, None, "toppra", as_json=True)
+    printed = PlanDocument.model_validate_json(capsys.readouterr().out)
+    assert printed.ok
+    assert printed.method == "toppra"
+    with pytest.raises(InputError, match="allowed are toppra, casadi, penalty"):
+        run_plan(path, None, "rrt", as_json=True)
 
 
 def test_a_method_that_is_not_known_is_one_sentence() -> None:
