@@ -74,6 +74,7 @@ def offer(state: str = "offered", **changes: Any) -> dict[str, Any]:
     checks = {
         "min_clearance": 0.71,
         "min_own_clearance": 0.1,
+        "min_ground_clearance": 0.4,
         "min_stability_margin": 0.42,
         "worst_rate": 0.99,
         "worst_acceleration": 0.99,
@@ -177,6 +178,16 @@ class TrajectoryFeed(DriveFeed):
             **changes,
         }
         self.seat = {**self.seat, "follow": {"left": FollowModel(**found).model_dump()}}
+
+    def click_side(self, out: float, up: float) -> None:
+        """In the side view, metres out from the swing axis and over the ground."""
+        frame = self.shown("tj-plot-side")["frame"]
+        box = self.page.locator("#tj-plot-side").bounding_box()
+        assert box is not None
+        low, high = frame["span"]
+        x = frame["left"] + out / frame["far"] * (frame["right"] - frame["left"])
+        y = frame["bottom"] - (up - low) / (high - low) * (frame["bottom"] - frame["top"])
+        self.page.mouse.click(box["x"] + x, box["y"] + y)
 
 
 def no_overflow(feed: TrajectoryFeed, size: tuple[int, int]) -> None:
@@ -285,6 +296,43 @@ def test_from_a_click_to_the_goal(browser: Browser, size: tuple[int, int], artif
     feed.follow(ended="arrived", arrived=True, at=6.0)
     feed.offers = {"left": offer("done")}
     feed.until_state("ARRIVED")
+    assert feed.errors == []
+    feed.page.close()
+
+
+@pytest.mark.parametrize("size", SIZES, ids=lambda s: f"{s[0]}x{s[1]}")
+def test_the_goal_is_set_from_the_side(
+    browser: Browser, size: tuple[int, int], artifacts: Path
+) -> None:
+    feed = TrajectoryFeed(browser, size)
+    feed.open()
+    feed.send(lambda: bool(feed.shown("tj-plot-side").get("frame")))
+    assert feed.page.is_hidden("#tj-plot-swing")
+    assert feed.page.is_visible("#slice-0")
+    assert feed.shown("tj-plot-side")["goal"] is None
+    feed.click(*GOAL)
+    feed.send(lambda: feed.shown("tj-plot-side")["goal"] is not None)
+    out = feed.shown("tj-plot-side")["goal"][0]
+    feed.click_side(3.0, 1.5)
+    feed.send(lambda: feed.shown("tj-plot-side")["goal"][0] == pytest.approx(3.0, abs=0.06))
+    assert float(feed.page.input_value("#tj-height")) == pytest.approx(1.5, abs=0.11)
+    # In the same direction as before, seen from the swing axis.
+    first, then = np.array(GOAL), np.array(feed.drawn()["goal"])
+    assert np.linalg.norm(then - first) == pytest.approx(abs(3.0 - out), abs=0.15)
+    feed.click_side(2.0, -0.6)
+    feed.send(lambda: feed.page.input_value("#tj-height").startswith("-0."))
+    feed.page.screenshot(path=artifacts / f"trajectory-side-{size[0]}x{size[1]}.png")
+    no_overflow(feed, size)
+    feed.offers = {"left": offer()}
+    feed.until_state("READY")
+    feed.send(lambda: feed.page.is_visible("#tj-plot-joints"))
+    assert feed.page.is_hidden("#tj-plot-side")
+    feed.page.click("#tj-third")
+    feed.send(lambda: feed.shown("tj-plot-side").get("path") == 121)
+    assert feed.page.is_hidden("#tj-plot-joints")
+    assert feed.shown("tj-plot-side")["simple"] == 121
+    no_overflow(feed, size)
+    assert feed.asked == []
     assert feed.errors == []
     feed.page.close()
 

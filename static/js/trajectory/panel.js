@@ -8,6 +8,7 @@ import { $, mark, write } from "../words.js";
 import { setHeight, setOpen, startDrawing } from "./draw.js";
 import * as model from "./model.js";
 import { surfaces } from "./plots.js";
+import { startSide } from "./side.js";
 
 const FIELDS = { height: [0.5, -20, 40], payload: [0, 0, 1e6], lift: [0, 0, 20], clearance: [0.2, 0.05, 4], speed: [100, 1, 100], acceleration: [100, 1, 100] };
 const STATES = { planning: "PLANNING", none: "NO WAY", offered: "READY", unknown: "UNKNOWN", void: "VOID", done: "ARRIVED" };
@@ -17,6 +18,7 @@ let redraw = () => {};
 let plots = [];
 let drawn = "";
 let used = false;
+let third = "joints"; // in the third plot, once there is a trajectory
 
 /** What the fields say; null with the first that makes no sense. */
 function entered() {
@@ -122,16 +124,17 @@ export function closeTrajectory() {
 
 /** plan: draws the plan view anew. Returns the surfaces of its plots. */
 export function startTrajectory(send, plan) {
-  plots = surfaces();
+  const chosen = () => {
+    update();
+    redraw();
+  };
+  plots = [...surfaces(), startSide(chosen)];
   redraw = () => {
     plan();
     for (const one of plots) one.dirty = true;
   };
   model.startModel(send);
-  startDrawing(() => {
-    update();
-    redraw();
-  });
+  startDrawing(chosen);
   $("trajectory-open").addEventListener("click", () => (open ? closeTrajectory() : openTrajectory()));
   $("tj-close").addEventListener("click", closeTrajectory);
   $("tj-plan").addEventListener("click", ask);
@@ -142,6 +145,10 @@ export function startTrajectory(send, plan) {
   $("tj-drop").addEventListener("click", () => {
     model.drop();
     keys();
+  });
+  $("tj-third").addEventListener("click", () => {
+    third = third === "joints" ? "side" : "joints";
+    chosen();
   });
   $("tj-pause").addEventListener("click", model.pause);
   $("tj-time").addEventListener("input", () => model.seek(Number($("tj-time").value)));
@@ -162,7 +169,14 @@ export function update() {
   model.update(open);
   $("trajectory-open").setAttribute("aria-pressed", String(open));
   $("trajectory").hidden = !open;
-  $("tj-plots").hidden = !open || !model.document()?.ok;
+  const made = model.document()?.ok === true, drawnThird = made ? third : "side";
+  $("tj-plots").hidden = !open;
+  mark($("tj-plots"), "only", made ? 0 : 1);
+  $("tj-third").hidden = !made;
+  write($("tj-third"), drawnThird === "joints" ? "Side" : "Joints");
+  write($("tj-third-name"), drawnThird === "joints" ? "Joints" : "Side");
+  $("tj-plot-joints").hidden = drawnThird !== "joints";
+  $("tj-plot-side").hidden = drawnThird !== "side";
   mark(document.body, "trajectory", open ? 1 : 0);
   if (!open) return undefined;
   const offer = model.offer(), picked = model.picked(), asked = entered();
