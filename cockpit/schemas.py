@@ -24,7 +24,7 @@ from backend.documents.gauge import GaugeDocument
 from backend.documents.gauge_choice import GaugeChoiceFile, GaugeStateDocument
 from backend.documents.people import PeopleModel
 from backend.documents.plan_document import PlanDocument, PlanTaskDocument
-from backend.documents.plan_figures import FollowedSeries
+from backend.documents.plan_series import FollowedSeries
 from backend.documents.plan_state import PlanRequest, PlanStateDocument
 from backend.documents.recordings import RecordingsDocument, RecoverDocument
 from backend.documents.session import DiffDocument, SeriesDocument, SessionDocument

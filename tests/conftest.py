@@ -71,9 +71,15 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     """Tests of real descriptions run where the descriptions are, and are deselected elsewhere."""
     if SHARED.is_dir():
         return
-    absent = [i for i in items if "shared_data" in getattr(i, "fixturenames", ())]
+    absent = [i for i in items if _needs_shared(i)]
     items[:] = [i for i in items if i not in absent]
     config.hook.pytest_deselected(items=absent)
+
+
+def _needs_shared(item: pytest.Item) -> bool:
+    parameters = item.callspec.params.values() if hasattr(item, "callspec") else ()
+    named = any(isinstance(value, str) and value == "zx200" for value in parameters)
+    return named or "shared_data" in getattr(item, "fixturenames", ())
 
 
 def pytest_report_header() -> str:

@@ -6,7 +6,7 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, Field, ValidationError, model_validator
 
-from backend.documents.plan_figures import PlanFigures
+from backend.documents.plan_series import PlanFigures
 from backend.documents.state import (
     NotNegative,
     Number,

@@ -2,48 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
-from pydantic import BaseModel, Field
 
+from backend.documents.plan_series import MotionSeries, PlanFigures
 from backend.machine.kinematics import end_point
 from backend.machine.model import Machine
 from backend.planning.trajectory.figures import Motion, initial_motion, motion_of
 from backend.planning.trajectory.records import Task, Trajectory
 from backend.spatial.types import Array
-
-Row = list[float]
-Values = Annotated[
-    list[float | None], Field(description="null where no rate or acceleration tips it, or unknown")
-]
-
-
-class MotionSeries(BaseModel):
-    """One trajectory over its time. Limits are of two masses on level ground."""
-
-    time: list[float] = Field(description="[s]")
-    end_point: list[Row] = Field(description="in the document's frame [m]")
-    swing: list[float] = Field(description="rate [rad/s]")
-    critical_swing: Values = Field(description="Omega_c [rad/s]; (8), (9), corrected")
-    lift: Values = Field(description="a_z, upward acceleration of arm and load [m/s^2]")
-    critical_lift: Values = Field(description="a_cz [m/s^2]; (7), corrected")
-
-
-class PlanFigures(BaseModel):
-    """The simple trajectory and the planned one."""
-
-    initial: MotionSeries = Field(
-        description="straight in joint space, as fast as the joints alone allow"
-    )
-    planned: MotionSeries
-
-
-class FollowedSeries(MotionSeries):
-    """What the sensors saw while a trajectory was followed."""
-
-    at: list[float] = Field(description="the path's time [s]; time counts from the beginning")
-    joints: list[Row] = Field(description="[rad]")
 
 
 def figures(machine: Machine, task: Task, made: Trajectory, T_frame_root: Array) -> PlanFigures:

@@ -195,7 +195,7 @@ class PlanDesk:
                 plan.seen.append(row)
 
     def followed(self, machine: str, plan: str) -> dict[str, Any]:
-        """What backend.documents.plan_figures.FollowedSeries describes. Raises InputError."""
+        """What backend.documents.plan_series.FollowedSeries describes. Raises InputError."""
         found = self._of(machine, plan)
         if isinstance(found, str):
             raise InputError(f"{found}.")

@@ -17,8 +17,8 @@ from fastapi import FastAPI
 from backend.collision.closest import closest_pairs
 from backend.control.follow import ARRIVED, Trajectory
 from backend.documents.plan_document import PlanDocument
-from backend.documents.plan_figures import FollowedSeries
 from backend.documents.plan_live import kept, live_task
+from backend.documents.plan_series import FollowedSeries
 from backend.documents.plan_state import PlanRequest, PlanStateDocument
 from backend.errors import InputError
 from backend.fusion.inflation import spread

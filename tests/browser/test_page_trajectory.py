@@ -16,7 +16,7 @@ from playwright.sync_api import Browser, Route
 from test_page_exact import CLIPPED, OUTSIDE, SIZES
 
 from backend.documents.plan_document import PlanDocument
-from backend.documents.plan_figures import FollowedSeries, PlanFigures
+from backend.documents.plan_series import FollowedSeries, PlanFigures
 from backend.documents.plan_state import PlanOffer, PlanRequest, PlanStateDocument
 from backend.shell.app.driving_models import FollowModel
 from backend.spatial.types import Array

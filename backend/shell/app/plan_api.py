@@ -7,7 +7,7 @@ from typing import Any, Protocol
 from fastapi import APIRouter, Request, Response
 
 from backend.documents.plan_document import PlanDocument
-from backend.documents.plan_figures import FollowedSeries
+from backend.documents.plan_series import FollowedSeries
 from backend.documents.plan_state import PlanRequest, PlanStateDocument
 from backend.errors import InputError
 from backend.shell.app.answers import refused, who
