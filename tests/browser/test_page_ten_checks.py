@@ -144,6 +144,7 @@ def test_2_the_longest_advice_is_read_to_its_end(look: Looked) -> None:
     assert font >= 11.0
     # A short advice afterwards has its usual letters.
     look.alarmed()
+    look.send(lambda: look.page.inner_text("#alarm-detail") == DETAIL, **ALARMED)
     assert look.page.get_attribute("#alarm-detail", "data-scale") in (None, "")
 
 
