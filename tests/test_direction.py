@@ -35,6 +35,13 @@ ROOMS: dict[str, set[str]] = {
         *("backend.safety", "backend.collision", "backend.machine", "backend.spatial"),
         *("backend.stability", "backend.errors"),
     },
+    "backend.contact": {
+        *("backend.stability", "backend.machine", "backend.spatial", "backend.errors"),
+    },
+    "backend.surmount": {
+        *("backend.contact", "backend.planning", "backend.stability", "backend.machine"),
+        *("backend.spatial", "backend.errors"),
+    },
     "backend.perception": {"backend.spatial", "backend.errors"},
     "backend.tracking": {"backend.spatial", "backend.errors"},
     "backend.control": {
@@ -47,7 +54,7 @@ ROOMS: dict[str, set[str]] = {
     },
     "backend.documents": {
         *("backend.pipeline", "backend.planning", "backend.safety", "backend.cspace"),
-        *("backend.collision", "backend.stability"),
+        *("backend.collision", "backend.stability", "backend.contact", "backend.surmount"),
         *("backend.gauge", "backend.site", "backend.fusion", "backend.machine"),
         *("backend.perception", "backend.tracking", "backend.spatial", "backend.errors"),
     },
@@ -79,6 +86,7 @@ LIBRARIES: dict[str, str | tuple[str, ...]] = {
     "starlette": "backend.shell.app",
     "uvicorn": "backend.shell.app",
     "toppra": "backend.planning.trajectory.timing",
+    "mujoco": "backend.contact",
     "casadi": "backend.planning.trajectory.timing",
     "viser": "cockpit.views",
 }
@@ -86,7 +94,7 @@ LIBRARIES: dict[str, str | tuple[str, ...]] = {
 IMPURE = {"time", "random", "threading", "logging", "asyncio", "socket", "subprocess", "requests"}
 PURE = {
     *("spatial", "collision", "control", "cspace", "fusion", "gauge", "safety", "planning"),
-    *("perception", "pipeline", "stability", "tracking"),
+    *("contact", "perception", "pipeline", "stability", "surmount", "tracking"),
 }
 
 

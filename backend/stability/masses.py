@@ -67,7 +67,7 @@ def mass_model(machine: Machine, payload: float = 0.0, at: Array | None = None) 
         raise InputError(f"{why}; tipping over cannot be judged, only with masses_trusted = true.")
     if not (np.isfinite(payload) and payload >= 0.0):
         raise InputError(f"payload = {payload} kg: a finite number, 0 or more, is allowed.")
-    group, T_group_link = _groups(machine)
+    group, T_group_link = rigid_groups(machine)
     heads = [0, *(i for i, link in enumerate(machine.links) if link.joint >= 0)]
     count = len(heads)
     masses = np.zeros(count)
@@ -117,7 +117,7 @@ def mass_model(machine: Machine, payload: float = 0.0, at: Array | None = None) 
     )
 
 
-def _groups(machine: Machine) -> tuple[list[int], Array]:
+def rigid_groups(machine: Machine) -> tuple[list[int], Array]:
     """By link: the body it belongs to, and T_body_link (L, 4, 4)."""
     group: list[int] = []
     T = np.zeros((len(machine.links), 4, 4))

@@ -1,0 +1,1 @@
+"""Surmounting obstacles with the arm (Jayasekara and Arisumi 2015)."""
