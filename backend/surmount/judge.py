@@ -42,7 +42,8 @@ that the crawler's pressure stays off the edge."""
 @dataclass(frozen=True, eq=False)
 class Sequence:
     """One sequence worked out. lines: (m, 2, 3) of what bears the machine, see `support.margin`;
-    lines_z: (m, 2) their heights [m]; zmp: (m, 2) [m]; margin: (m,) [m]; duration [s].
+    lines_z: (m, 2) their heights [m]; zmp: (m, 2) [m]; margin: (m,) [m]; duration [s]; potential:
+    the least that any drive must do [J], as heights of the centre of mass ask for it.
     """
 
     name: str
@@ -55,6 +56,7 @@ class Sequence:
     lines_z: Array
     zmp: Array
     margin: Array
+    potential: float
 
 
 def course_of(
@@ -102,6 +104,7 @@ def worked_out(climber: Climber, step: Step, name: str, course: Course, joints: 
         lines_z,
         points,
         margin(points, lines),
+        climber.weight * float(np.abs(np.diff(weights.centre[:, 2])).sum()),
     )
 
 
