@@ -31,6 +31,13 @@ from backend.documents.session import DiffDocument, SeriesDocument, SessionDocum
 from backend.documents.stability import StabilityModel
 from backend.documents.stages import StagesDocument
 from backend.documents.state import StateDocument
+from backend.documents.surmount_document import SurmountDocument
+from backend.documents.surmount_state import (
+    FollowedSurmount,
+    SideView,
+    SurmountRequest,
+    SurmountStateDocument,
+)
 from backend.documents.use_case import UseCaseDocument
 from backend.documents.use_case_state import UseCaseStateDocument
 from backend.documents.zone import ZoneFrameHeader
@@ -51,6 +58,11 @@ SCHEMAS: dict[str, tuple[type[BaseModel], str]] = {
     "plan-followed": (FollowedSeries, "/api/plan/MACHINE/PLAN/followed"),
     "plan-request": (PlanRequest, "what is posted to /api/plan"),
     "plan-state": (PlanStateDocument, "/api/plan, and the key plans of a snapshot"),
+    "surmount": (SurmountDocument, "what surmount --json prints"),
+    "surmount-request": (SurmountRequest, "what is posted to /api/surmount"),
+    "surmount-state": (SurmountStateDocument, "/api/surmount, and the key surmounts of a snapshot"),
+    "surmount-side": (SideView, "/api/surmount/MACHINE/PLAN/side"),
+    "surmount-followed": (FollowedSurmount, "/api/surmount/MACHINE/PLAN/followed"),
     "along": (AlongDocument, "what along --json prints"),
     "use-case": (UseCaseDocument, "what use-case --json prints"),
     "use-case-state": (UseCaseStateDocument, "/api/use-case"),

@@ -14,6 +14,7 @@ from typing import Any
 from backend.control.person import Person
 from backend.documents.site import site_document
 from backend.documents.snapshot import snapshot_document
+from backend.documents.surmount_solve import solve
 from backend.errors import InputError
 from backend.perception.stages import StagedScan
 from backend.pipeline.people_records import Seen
@@ -28,6 +29,7 @@ from backend.shell.app.metrics import metrics_router
 from backend.shell.app.plan_api import plan_router
 from backend.shell.app.server import WebServer, bind
 from backend.shell.app.stages import stages_router
+from backend.shell.app.surmount_api import surmount_router
 from backend.shell.app.use_case_api import use_case_router
 from backend.shell.app.viewer_proxy import Hooks, viewer_router
 from backend.shell.app.wire import dumps
@@ -37,9 +39,11 @@ from backend.shell.link.receiver import Receiver
 from backend.shell.link.relay import Relay
 from backend.shell.link.session import open_session
 from backend.shell.link.source import LinkSource
+from backend.shell.offered import Offered
 from backend.shell.plan_desk import PlanDesk, Progress
 from backend.shell.runner import Runner
 from backend.shell.session.recorder import Recorder
+from backend.shell.surmount_desk import SurmountDesk
 from backend.shell.use_case_desk import UseCaseDesk
 from backend.shell.use_case_offers import offers
 from backend.site.site import Site
@@ -51,6 +55,7 @@ from cockpit.people import make_people
 from cockpit.plan_scene import PlanScene
 from cockpit.recording import make_recorder, recording_sources, site_folder
 from cockpit.resolutions import resolutions
+from cockpit.surmount_scene import SurmountScene, previewed
 from cockpit.use_case_scene import UseCaseScene
 from cockpit.views.client_head import HEAD
 from cockpit.views.inputs import scene_site
@@ -113,13 +118,17 @@ class Station:
         self._closing.callback(self.use_cases.close)
         self.plans = PlanDesk(self.config, self.hub.latest, self._followed, self._event)
         self._closing.callback(self.plans.close)
+        self.surmounts = SurmountDesk(
+            self.config, self.hub.latest, self._followed, self._event, solve
+        )
+        self._closing.callback(self.surmounts.close)
         self._desk = Desk(
             self.config,
             self.hub,
             lambda: self.view,
             self.recorder.action,
             played=UseCaseScene(self.use_cases).played,
-            previewed=PlanScene(self.plans).played,
+            previewed=previewed(PlanScene(self.plans), SurmountScene(self.surmounts)),
         )
         kept = state_folder() / "gauge" / f"{site.name}.json"
         self.gauge = GaugeDesk(self.config, self.hub, kept, self._event)
@@ -132,7 +141,8 @@ class Station:
         self._closing.callback(self.receiver.close)
         self.people = make_people(self.config, self.receiver)
         self.driving = make_driving(
-            site, self.config, session, self.receiver, self._event, self.plans
+            *(site, self.config, session, self.receiver, self._event),
+            Offered(self.plans, self.surmounts),
         )
         self._closing.callback(self.driving.shut)
         self.runner = Runner(
@@ -185,6 +195,7 @@ class Station:
                 gauge_router(self.gauge),
                 use_case_router(self.use_cases),
                 plan_router(self.plans),
+                surmount_router(self.surmounts),
                 *(() if self.people is None else (stages_router(self.people.look),)),
             ),
             access=access,
@@ -223,6 +234,7 @@ class Station:
         document["recording"] = vars(self.recorder.state())
         document["driving"] = self.driving.document()
         document["plans"] = self.plans.document()
+        document["surmounts"] = self.surmounts.document()
         if self._demo_began is not None:
             document["demo"] = {"elapsed": time.time() - self._demo_began()}
         return document
@@ -256,6 +268,7 @@ class Station:
                 self._driving_failure = f"driving stopped: {error!r}"
                 log.exception("%s", self._driving_failure)
         self.plans.keep(snapshot)
+        self.surmounts.keep(snapshot)
         self._desk.recent.keep(snapshot)
         if self.people is not None:
             self.people.keep(snapshot)

@@ -39,8 +39,8 @@ ROOMS: dict[str, set[str]] = {
         *("backend.stability", "backend.machine", "backend.spatial", "backend.errors"),
     },
     "backend.surmount": {
-        *("backend.contact", "backend.stability", "backend.machine", "backend.spatial"),
-        "backend.errors",
+        *("backend.contact", "backend.planning", "backend.stability", "backend.machine"),
+        *("backend.spatial", "backend.errors"),
     },
     "backend.perception": {"backend.spatial", "backend.errors"},
     "backend.tracking": {"backend.spatial", "backend.errors"},

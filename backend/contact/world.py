@@ -17,6 +17,7 @@ import mujoco
 import numpy as np
 
 from backend.contact.crawler import Crawler, crawler_of
+from backend.contact.outfit import edge_half_width, edge_radius
 from backend.machine.model import Machine
 from backend.spatial import rotation
 from backend.spatial.boxes import NO_BOXES, Boxes
@@ -33,8 +34,8 @@ SAG = 0.02
 """Of a joint whose whole load came unexpectedly, before it is made up for [rad]."""
 DAMPING = 0.04
 """Of a joint's servo: its torque per rate over its torque per angle [s]."""
-EDGE = 0.015
-"""Radius of the bar along the bucket's edge, of the length from pivot to edge."""
+RIGID = 0.999
+"""Impedance of the belts' drives: they keep their speed whatever force that takes."""
 GROUND, MACHINE, BUCKET = 1, 2, 4
 """Kinds of geoms, as bits: what touches what."""
 
@@ -87,23 +88,21 @@ class ContactWorld:
         self.model = spec.compile()
         self.data = mujoco.MjData(self.model)
         joints = range(len(machine.joints))
-        self._q = np.array([self.model.joint(f"joint {k}").qposadr[0] for k in joints])
-        self._v = np.array([self.model.joint(f"joint {k}").dofadr[0] for k in joints])
-        slides = [self.model.joint(f"belt {side}") for side in SIDES]
-        self._slides = np.array([one.qposadr[0] for one in slides])
-        self._belt_dofs = np.array(
-            [
-                [
-                    self.model.joint(name.format(side)).dofadr[0]
-                    for name in ("belt {}", "wheel rear {}", "wheel front {}")
-                ]
-                for side in SIDES
-            ]
-        )
+        self.joint_places = np.array([self.model.joint(f"joint {k}").qposadr[0] for k in joints])
+        self.joint_dofs = np.array([self.model.joint(f"joint {k}").dofadr[0] for k in joints])
+        belts = [self.model.joint(name) for name in BELT_JOINTS]
+        self._belt_places = np.array([one.qposadr[0] for one in belts])
+        self.belt_dofs = np.array([one.dofadr[0] for one in belts])
+        self._drives = np.array([self.model.equality(name).id for name in BELT_JOINTS])
         n = len(machine.joints)
-        self._belt_motors = n + np.arange(6).reshape(2, 3)
+        self._n = n
+        # A drive holds its joint at 0 with a spring and a damper; a place ahead by their ratio
+        # times a speed is that speed.
+        ahead = 2.0 * RIGID * 2.0 * options.step
+        r = self.crawler.radius
+        self._per_speed = ahead * np.array([-1.0, 1.0 / r, 1.0 / r])
+        self.edge_site = int(self.model.site("edge").id)
         self._gains = stiffness(machine, self.masses)
-        self._offset = np.zeros(n)
         self.reset(np.eye(4), np.zeros(n))
 
     def reset(self, T_world_root: Array, q: Array) -> None:
@@ -111,28 +110,28 @@ class ContactWorld:
         mujoco.mj_resetData(self.model, self.data)
         self.data.qpos[:3] = T_world_root[:3, 3]
         mujoco.mju_mat2Quat(self.data.qpos[3:7], np.asarray(T_world_root[:3, :3]).ravel())
-        self.data.qpos[self._q] = q
-        self.data.ctrl[: len(self._q)] = q
+        self.data.qpos[self.joint_places] = q
+        self.data.ctrl[:] = q
         mujoco.mj_forward(self.model, self.data)
 
     def control(self, q: Array, rates: Array, belts: Array, torque: Array | None = None) -> Array:
-        """(..., nu) what the servos are given to follow: q, rates (..., n) [rad, rad/s]; belts
-        (..., 2) left, right, over the ground forwards [m/s]; torque: (..., n) known beforehand
-        [N m], so that the servos make up for the rest only.
+        """(..., n + 6) what servos and belts are given to follow: q, rates (..., n) [rad, rad/s];
+        belts (..., 2) left, right, over the crawler, forwards [m/s]; torque: (..., n) known
+        beforehand [N m], so that the servos make up for the rest only.
         """
         ahead = np.asarray(q, dtype=float) + DAMPING * np.asarray(rates, dtype=float)
         if torque is not None:
             ahead = ahead + np.asarray(torque) / self._gains
-        v = np.repeat(np.asarray(belts, dtype=float)[..., :, None], 3, axis=-1)
-        v = v * np.array([-1.0, 1.0 / self.crawler.radius, 1.0 / self.crawler.radius])
+        v = np.asarray(belts, dtype=float)[..., :, None] * self._per_speed
         return np.concatenate([ahead, v.reshape(*v.shape[:-2], 6)], axis=-1)
 
     def step(self, control: Array) -> None:
-        """`options.step` seconds on. control: (nu,) of `control`."""
+        """`options.step` seconds on. control: (n + 6,) of `control`."""
         data = self.data
-        data.ctrl[:] = control
+        data.ctrl[:] = control[: self._n]
+        self.model.eq_data[self._drives, 0] = control[self._n :]
         mujoco.mj_step(self.model, data)
-        data.qpos[self._slides] = 0.0
+        data.qpos[self._belt_places] = 0.0
 
     @property
     def time(self) -> float:
@@ -161,32 +160,49 @@ class ContactWorld:
     @property
     def q(self) -> Array:
         """(n,) [rad]"""
-        return np.array(self.data.qpos[self._q])
+        return np.array(self.data.qpos[self.joint_places])
 
     @property
     def rates(self) -> Array:
         """(n,) [rad/s]"""
-        return np.array(self.data.qvel[self._v])
+        return np.array(self.data.qvel[self.joint_dofs])
 
     @property
     def belts(self) -> Array:
         """(2,) speed of the left and right belt over the crawler [m/s], forwards."""
-        return np.array(-self.data.qvel[self._belt_dofs[:, 0]])
+        return -np.array(self.data.qvel[self.belt_dofs[[0, 3]]])
 
     @property
     def torques(self) -> Array:
         """(n,) of the joints [N m]."""
-        return np.array(self.data.actuator_force[: len(self._q)])
+        return np.array(self.data.actuator_force)
 
-    def belt_power(self) -> Array:
-        """(2,) mechanical power into the left and right belt, end wheels included [W]."""
-        force = self.data.actuator_force[self._belt_motors]
-        return np.asarray((force * self.data.qvel[self._belt_dofs]).sum(axis=1))
+    @property
+    def drives(self) -> Array:
+        """(6,) force or torque of the drives on belt, rear and front wheel of the left side, then
+        of the right [N, N m]."""
+        return np.array(self.data.efc_force[: len(BELT_JOINTS)])
 
     def deepest(self) -> float:
         """How far anything is in the ground [m]."""
         dist = self.data.contact.dist
         return float(max(0.0, -dist.min())) if len(dist) else 0.0
+
+    def poses_of(self, base: Array) -> Array:
+        """(k, 4, 4) of places and quaternions (k, 7) as in MuJoCo's qpos."""
+        w, x, y, z = base[:, 3:7].T
+        T = np.zeros((len(base), 4, 4))
+        T[:, 0] = np.stack(
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y), base[:, 0]], axis=1
+        )
+        T[:, 1] = np.stack(
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x), base[:, 1]], axis=1
+        )
+        T[:, 2] = np.stack(
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y), base[:, 2]], axis=1
+        )
+        T[:, 3, 3] = 1.0
+        return T
 
     def edge(self) -> Array:
         """(3,) the middle of the bar along the bucket's edge [m], world frame."""
@@ -219,19 +235,9 @@ class ContactWorld:
 
 
 SIDES = ("left", "right")
-
-
-def edge_radius(machine: Machine) -> float:
-    """Of the bar along the bucket's edge [m]; it lies around the end point."""
-    return EDGE * machine.sun.lengths[3]
-
-
-def edge_half_width(machine: Machine) -> float:
-    """Half of the bucket's width [m]: of the bodies that the last of the arm's joints moves."""
-    last = [k for k, link in enumerate(machine.body_links) if link == machine.end_link]
-    if not last:
-        return 0.1 * machine.sun.lengths[3]
-    return 0.5 * float(np.ptp(machine.body_corners[last][..., 1]))
+BELT_JOINTS = tuple(
+    f"{name} {side}" for side in SIDES for name in ("belt", "wheel rear", "wheel front")
+)
 
 
 def stiffness(machine: Machine, masses: MassModel) -> Array:
@@ -310,22 +316,14 @@ def _spec(
             gainprm=[gains[k], *[0.0] * 9],
             biasprm=[0.0, -gains[k], -DAMPING * gains[k], *[0.0] * 7],
         )
-    drive = 2.0 * masses.total / options.step * 0.05
-    for side in SIDES:
-        for name, lever in (
-            ("belt", 1.0),
-            ("wheel rear", crawler.radius),
-            ("wheel front", crawler.radius),
-        ):
-            gain = drive * lever**2
-            spec.add_actuator(
-                name=f"{name} {side}",
-                target=f"{name} {side}",
-                trntype=mujoco.mjtTrn.mjTRN_JOINT,
-                biastype=mujoco.mjtBias.mjBIAS_AFFINE,
-                gainprm=[gain, *[0.0] * 9],
-                biasprm=[0.0, 0.0, -gain, *[0.0] * 7],
-            )
+    for name in BELT_JOINTS:
+        spec.add_equality(
+            name=name,
+            type=mujoco.mjtEq.mjEQ_JOINT,
+            name1=name,
+            solref=[2.0 * options.step, 1.0],
+            solimp=[RIGID, RIGID, 0.001, 0.5, 2.0],
+        )
     return spec
 
 

@@ -22,12 +22,12 @@ from backend.documents.plan_figures import series
 from backend.documents.plan_live import Announced, LiveTask, kept, live_task, obstacles_of, unknown
 from backend.documents.plan_state import PlanRequest
 from backend.errors import InputError
-from backend.machine.model import Machine
 from backend.pipeline.config import Config
 from backend.pipeline.records import Snapshot
 from backend.planning.trajectory.figures import seen_motion
 from backend.shell.aside import Aside, WorkerGone
 from backend.shell.plan_worker import Answer, Look, begin
+from backend.shell.standing import elsewhere, off_by
 from backend.spatial.angles import wrap
 from backend.spatial.types import Array
 
@@ -37,11 +37,6 @@ WATCHED = 0.5
 """Between two looks at whether plans still hold [s]."""
 OLD = 3.0
 """Not looked at for longer than this, whether a plan holds is not known [s]."""
-DRIVEN = 0.15
-"""A machine whose base moved farther than this [m], or turned by more than TURNED [rad], since is
-somewhere else.
-"""
-TURNED = math.radians(1.5)
 SAME = math.radians(1.0)
 """How near the end of a trajectory must be to joint values that were asked for [rad]."""
 
@@ -281,7 +276,7 @@ class PlanDesk:
             return "unknown", why
         body, q = snapshot.machines[machine].body, snapshot.machines[machine].pose.joints
         assert body is not None
-        why = _elsewhere(live.T_site_root, body.link_poses[0])
+        why = elsewhere(live.T_site_root, body.link_poses[0])
         if why:
             return "void", why
         progress = self._followed(machine)
@@ -291,7 +286,7 @@ class PlanDesk:
                 return ("done", "") if progress.arrived else ("void", progress.ended)
             at = progress.at
         if at <= 0.0:
-            off = _off(self._config.machines[machine], q, answer.trajectory.joints[0])
+            off = off_by(self._config.machines[machine], q, answer.trajectory.joints[0])
             if off > NEAR:
                 moved = f"the machine moved, {math.degrees(off):.0f} degrees from where it begins"
                 return "void", moved
@@ -366,23 +361,6 @@ class PlanDesk:
 def _of_each_pose(rows: list[Seen]) -> list[Seen]:
     """Without those that say again what the one before them said."""
     return [b for a, b in zip([None, *rows], rows, strict=False) if a is None or a[1] < b[1]]
-
-
-def _elsewhere(T_then: Array, T_now: Array) -> str:
-    """How far the base moved since, in words; empty while it stands where it stood."""
-    moved = float(np.linalg.norm(T_now[:3, 3] - T_then[:3, 3]))
-    if moved > DRIVEN:
-        return f"the machine's base moved by {moved:.2f} m"
-    cosine = 0.5 * (float(np.trace(T_then[:3, :3].T @ T_now[:3, :3])) - 1.0)
-    turned = math.acos(min(max(cosine, -1.0), 1.0))
-    return f"the base turned by {math.degrees(turned):.1f} degrees" if turned > TURNED else ""
-
-
-def _off(machine: Machine, q: Array, start: Array) -> float:
-    """The largest difference of a joint [rad]; those without ends modulo a turn."""
-    off = q - start
-    off = np.where([joint.continuous for joint in machine.joints], wrap(off), off)
-    return float(np.abs(off).max())
 
 
 def _at(goal: Array | None, trajectory: Trajectory | None) -> bool:

@@ -36,6 +36,8 @@ class Played:
     the method; times: (m,) [s]; q: (m, n) [rad]; distance: (m,) of the deciding pair [m]; pair:
     (m,) index into pairs, in words; points: (m, 2, 3) of it; tool, designed: (m, 3) where the tool
     was and was meant to be; all in the machine's root frame [m]. Without pairs no pair is drawn.
+    Of a machine whose base moves, too: roots: (m, 4, 4) in place of T_site_root, which is where it
+    begins and what the paths stay in; parts: (m) names of what it does, in place of words.
     """
 
     machine: str
@@ -50,11 +52,21 @@ class Played:
     tool: Array
     designed: Array
     title: str = TITLE
+    roots: Array | None = None
+    parts: tuple[str, ...] = ()
 
     def instant(self, t: float) -> int:
         """The last instant not after t [s]; the first, the last where t is outside."""
         k = int(np.searchsorted(self.times, t + 1e-9, side="right")) - 1
         return min(max(k, 0), len(self.times) - 1)
+
+    def root(self, k: int) -> Array:
+        """T_site_root (4, 4) at an instant."""
+        return self.T_site_root if self.roots is None else np.asarray(self.roots[k])
+
+    def said(self, k: int) -> str:
+        """What stands beside the ghost at an instant."""
+        return f"{self.title} · {self.parts[k] if self.parts else self.words}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +118,7 @@ class UseCaseNodes:
         if k is None:
             self.hide()
             return
-        poses = kinematics.link_poses(self._model, run.q[k], run.T_site_root)
+        poses = kinematics.link_poses(self._model, run.q[k], run.root(k))
         on_it = self._stands_there(snapshot, poses)
         if (key := (run, k, on_it)) == self._drawn:
             return
@@ -117,9 +129,8 @@ class UseCaseNodes:
             self._meant.draw(_way(run.designed, run.T_site_root), ink(palette.STALE))
         self._drawn = key
         fixed = np.arange(len(poses)) == 0
-        words = f"{run.title} · {run.words}"
         touches = bool(run.pairs) and bool(run.distance[k] < 0.0)
-        self._ghost.stand(poses, fixed & on_it, words, touches)
+        self._ghost.stand(poses, fixed & on_it, run.said(k), touches)
         if run.pairs:
             self._draw_pair(run, k)
 

@@ -9,6 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from backend.documents.people import PeopleModel
 from backend.documents.plan_state import PlanOffer
 from backend.documents.stability import StabilityModel
+from backend.documents.surmount_state import SurmountOffer
 from backend.documents.working_area import WorkingAreaModel
 from backend.shell.app.driving_models import DrivingModel
 
@@ -209,6 +210,9 @@ class SnapshotModel(BaseModel):
     driving: DrivingModel | None = Field(None, description="not in playback")
     plans: dict[str, PlanOffer] = Field(
         default_factory=dict, description="by own machine its newest trajectory; not in playback"
+    )
+    surmounts: dict[str, SurmountOffer] = Field(
+        default_factory=dict, description="by own machine its newest manoeuvre; not in playback"
     )
     demo: DemoModel | None = Field(None, description="only in the demo")
     playback: PlaybackModel | None = Field(None, description="only in playback")

@@ -3,9 +3,8 @@
 import { get, post, send as request } from "../api.js";
 import { holds, seat } from "../drive/driving.js";
 import { described, machine, replaying, state } from "../state.js";
-import { page } from "../scene.js";
+import { makePreview, rowAt } from "./preview.js";
 
-const TOLD = 500; // between two words to the 3D scene, which forgets after some seconds [ms]
 const SEEN = 400; // between two questions for what the sensors saw [ms]
 const LATER = 1000; // before a plan that could not be fetched is asked for again [ms]
 
@@ -14,8 +13,7 @@ let goal = null; // {machine, at: [E, N]}: in the site frame [m]
 let failure = "";
 let acting = false, fetching = "", failed = -Infinity;
 let fetched = null; // {plan, document}
-let play = null; // {plan, at, since, rate}
-let said = -Infinity, sent = false;
+let preview = null;
 let actual = null; // {plan, series}
 let asked = -Infinity, asking = false, serial = 0;
 
@@ -79,49 +77,18 @@ export function drop() {
   if (offer()) act(() => request("DELETE", `/api/plan/${encodeURIComponent(state.own)}`));
 }
 
-export const shown = () => play !== null && document() !== null && play.plan === offer()?.plan;
 export const duration = () => document()?.duration ?? 0;
-export const playing = () => shown() && play.rate > 0 && time() < duration();
-
+export const shown = () => preview.shown();
+export const playing = () => preview.playing();
 /** The moment of the trajectory that is previewed [s]. */
-export function time() {
-  if (!shown()) return 0;
-  return Math.min(Math.max(play.at + (play.rate * (performance.now() - play.since)) / 1000, 0), duration());
-}
+export const time = () => preview.time();
+export const seek = (t) => preview.seek(t);
+export const pause = () => preview.pause();
+/** Takes the ghost away. */
+export const stop = () => preview.stop();
 
 /** The row of the document that belongs to a moment [s]. */
-export function row(t) {
-  const times = document().time;
-  let k = times.findIndex((one) => one > t + 1e-9);
-  if (k < 0) k = times.length;
-  return Math.max(0, k - 1);
-}
-
-export function seek(t) {
-  if (!document()) return;
-  play = { plan: offer().plan, at: t, since: performance.now(), rate: 0 };
-  said = -Infinity;
-}
-
-export function pause() {
-  if (!document()) return;
-  const on = playing(), at = time();
-  play = { plan: offer().plan, at: !on && at >= duration() ? 0 : at, since: performance.now(), rate: on ? 0 : 1 };
-  said = -Infinity;
-}
-
-/** Takes the ghost away. */
-export function stop() {
-  play = null;
-  tell();
-}
-
-function tell() {
-  said = performance.now();
-  if (shown()) send({ type: "plan", page, machine: state.own, plan: play.plan, at: time(), rate: playing() ? play.rate : 0 });
-  else if (sent) send({ type: "plan", page, machine: state.own, plan: null });
-  sent = shown();
-}
+export const row = (t) => rowAt(document().time, t);
 
 /** What the sensors saw while it was followed, a FollowedSeries; null before. */
 export const seen = () => (actual && actual.plan === offer()?.plan && actual.series.at.length ? actual.series : null);
@@ -145,8 +112,7 @@ async function fetchIt({ plan: name }) {
   fetching = name;
   try {
     fetched = { plan: name, document: await get(`/api/plan/${encodeURIComponent(state.own)}/${encodeURIComponent(name)}`) };
-    play ??= { plan: name, at: 0, since: performance.now(), rate: 1 };
-    if (play.plan !== name) play = { plan: name, at: 0, since: performance.now(), rate: 1 };
+    preview.begin(name);
   } catch {
     failed = performance.now(); // dropped meanwhile, or the link is slow: once more
   }
@@ -156,6 +122,7 @@ async function fetchIt({ plan: name }) {
 
 export function startModel(give) {
   send = give;
+  preview = makePreview(give, () => (document() ? offer().plan : null), duration);
 }
 
 /** Ten times a second. open: whether the panel is. */
@@ -167,7 +134,5 @@ export function update(open) {
     const { ended } = mine;
     fetchSeen(now).then(() => { if (actual) actual.whole = ended; });
   }
-  if (following() && play) play = null; // the machine itself shows it now
-  if (!open && play) play = null;
-  if ((shown() || sent) && (performance.now() - said >= TOLD || shown() !== sent)) tell();
+  preview.update(open && !following()); // followed, the machine itself shows it
 }

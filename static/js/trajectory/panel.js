@@ -1,17 +1,16 @@
 // The panel “Trajectory” in the place of the reach image: a goal on the plan, a plan, its preview, and following it.
 
-import { deg, metres, number, seconds } from "../axis.js";
-import { consoles, controllable, decision, holds } from "../drive/driving.js";
-import { deadMan } from "../drive/say.js";
+import { metres, number, seconds } from "../axis.js";
+import { controllable, holds } from "../drive/driving.js";
 import { label, machine, state } from "../state.js";
 import { $, mark, write } from "../words.js";
 import { setHeight, setOpen, startDrawing } from "./draw.js";
 import * as model from "./model.js";
 import { surfaces } from "./plots.js";
 import { startSide } from "./side.js";
+import { followLines, named, stateWord, things } from "./words.js";
 
 const FIELDS = { height: [0.5, -20, 40], payload: [0, 0, 1e6], lift: [0, 0, 20], clearance: [0.2, 0.05, 4], speed: [100, 1, 100], acceleration: [100, 1, 100] };
-const STATES = { planning: "PLANNING", none: "NO WAY", offered: "READY", unknown: "UNKNOWN", void: "VOID", done: "ARRIVED" };
 
 let open = false;
 let redraw = () => {};
@@ -34,30 +33,6 @@ function entered() {
   return { ...found, speed: found.speed / 100, acceleration: found.acceleration / 100, ground: $("tj-ground").checked };
 }
 
-/** "left:stick/0" -> "LEFT stick". */
-const thing = (name) => {
-  const [whose, part] = String(name).split(":");
-  if (part === undefined) return whose;
-  return machine(whose) ? `${label(whose)} ${part.split("/")[0]}` : part.split("/")[0];
-};
-const things = (names) => [...new Set(names.map(thing))].slice(0, 3).join(", ");
-/** The same within a sentence of the server's. */
-const named = (text) => String(text).replace(/\b([\w-]+):([\w .-]+)\/\d+/g, (all) => thing(all));
-
-function word() {
-  const follow = model.follow(), offer = model.offer();
-  if (model.following()) {
-    const console_ = consoles()[state.own]?.state;
-    return console_ === "Enabled" ? (follow.pace > 0.02 ? "FOLLOWING" : "WAITS") : "ACCEPTED";
-  }
-  if (follow?.ended && !follow.arrived && follow.plan === offer?.plan) return "ENDED";
-  if (model.planning()) return STATES.planning;
-  return offer ? STATES[offer.state] : "";
-}
-
-/** A direction that a concern has brought to a stand waits for neutral. */
-const stopped = () => Object.values(decision(state.own)?.causes ?? {}).some((both) => both.some((side) => side.concern === "neutral"));
-
 function result(offer) {
   const { duration, checks, clearance } = offer;
   const least = checks.min_clearance === null ? "nothing in reach" : `${metres(checks.min_clearance)} at least`;
@@ -70,14 +45,7 @@ function lines() {
   const offer = model.offer(), follow = model.follow(), asked = entered();
   if (asked.wrong) return [asked.wrong];
   if (model.trouble() && !model.following()) return [named(model.trouble())];
-  if (model.following()) {
-    const [role, off] = Object.entries(follow.error).reduce((worst, one) => (Math.abs(one[1]) > Math.abs(worst[1]) ? one : worst), ["", 0]);
-    const where = `${number(follow.at, 1)} of ${number(follow.duration, 1)} s · pace ${number(100 * follow.pace, 0)} % · error ${number(Math.abs(deg(off)), 1)}°${role ? ` ${role}` : ""}`;
-    const console_ = consoles()[state.own] ?? {};
-    if (console_.state === "Enabled" && stopped()) return [where, `A limit stopped it: let go, then hold ${deadMan()} again`];
-    if (console_.state === "Enabled") return [where, follow.pace > 0.02 ? "Let go to stop; a stick takes over" : "A limit holds it back, or a joint lags"];
-    return [where, `${console_.why ? `${named(console_.why)}. ` : ""}Hold ${deadMan()} to follow`];
-  }
+  if (model.following()) return followLines(follow);
   if (model.planning()) return ["Looking for a way that touches nothing and does not tip"];
   if (!offer) return model.picked() ? ["Plan finds a way to the goal; nothing moves by it"] : ["Click the goal on the plan"];
   if (offer.state === "none") return [`${offer.proven ? "Proven: " : ""}${named(offer.why)}`, ...(offer.blockers.length ? [`In the way: ${things(offer.blockers)}`] : [])];
@@ -182,7 +150,7 @@ export function update() {
   const offer = model.offer(), picked = model.picked(), asked = entered();
   setHeight(asked.height ?? 0);
   write($("tj-who"), label(state.own));
-  const now = word();
+  const now = stateWord(model);
   write($("tj-state"), now);
   mark($("trajectory"), "state", now);
   const from = machine(state.own)?.swing_center;

@@ -1,15 +1,15 @@
 // Figs. 6 and 7 of Yamashita and Kikuuwe 2025, live: swing rate and lift with the limits at which the machine tips, and the joints; the simple trajectory, the planned one, and what the sensors saw.
 
-import { C, size } from "../theme.js";
-import { deg, number, ticks } from "../axis.js";
-import { clear, label, legend, legendWidth, message, segment, swatches } from "../pen.js";
-import { curve, frame, points, upward } from "../plots/chart.js";
+import { C } from "../theme.js";
+import { deg, number } from "../axis.js";
+import { clear, label, swatches } from "../pen.js";
+import { curve, points, upward } from "../plots/chart.js";
+import { INKS, at, empty as nothing, entries, needle, overTime as plot, timeAt } from "../plots/over_time.js";
 import { surface } from "../surface.js";
 import { $ } from "../words.js";
 import * as model from "./model.js";
 
 const SIMPLE = [C.second, 1.5, [2, 3]], PLANNED = ["#FFFFFF", 2, null], LIMIT = [C.tipOver, 2, [8, 4]], ACTUAL = [C.remote, 3, null];
-const INKS = ["#D2C394", "#9FB9CC", "#BFB0CF", "#A9C4AC", "#CDAFA3", "#E6EAED"];
 const HIGHEST = { swing: 2.5, lift: 3 }; // times the largest value of the curves: where a limit is farther up it is told and not drawn
 
 const KINDS = {
@@ -23,38 +23,16 @@ const finite = (values) => values.filter(Number.isFinite);
 /** The moment that is shown: of the machine where it follows, else of the preview. */
 const moment = () => (model.following() ? model.follow().at : model.time());
 
-function entries(g, width, height, list) {
-  const t = size("tick");
-  const rows = legendWidth(g, list, 6) > width - 8 ? [list.slice(0, Math.ceil(list.length / 2)), list.slice(Math.ceil(list.length / 2))] : [list];
-  rows.forEach((row, k) => legend(g, 4, height - (rows.length - k - 0.4) * 1.15 * t, width - 6, row, 6));
-  return rows.length;
-}
-
-function now(g, chart) {
-  const at = chart.x(moment());
-  segment(g, at, chart.box.top, at, chart.box.bottom, C.halo, 4);
-  segment(g, at, chart.box.top, at, chart.box.bottom, "#FFFFFF", 1.5, [4, 2]);
-}
-
-const empty = (g, width, height, kind, text) => {
-  clear(g, width, height);
+const empty = (g, width, height, kind) => {
   charts[kind] = null;
-  message(g, width, height, text);
-  return { state: { kind, plan: null }, age: 0, label: "No trajectory" };
+  return nothing(g, width, height, kind, model.planning() ? "planning" : "no trajectory");
 };
-
-/** The frame over the trajectory's time, with room for `rows` of a legend below. */
-function plot(g, width, height, rows, up, title, unit, end) {
-  const t = size("tick");
-  const marks = ticks(0, end, Math.max(2, width / (5 * t)), [1, 2, 5, 10, 20, 50, 100]).map((v) => [v, `${number(v, 0)} s`]);
-  return frame(g, { left: 2, right: width - 2, height: height - rows * 1.15 * t - 2 }, { from: 0, to: end, marks }, up, title, unit, 2.4);
-}
 
 function limited(kind) {
   const { title, unit, of, limit, name } = KINDS[kind];
   return (g, width, height) => {
     const document = model.document(), figures = document?.figures;
-    if (!figures) return empty(g, width, height, kind, model.planning() ? "planning" : "no trajectory");
+    if (!figures) return empty(g, width, height, kind);
     clear(g, width, height);
     const { initial, planned } = figures, actual = model.seen();
     const first = of(initial), ours = of(planned), measured = actual ? of(actual) : [];
@@ -73,7 +51,7 @@ function limited(kind) {
     draw(planned.time, limits.map((v) => (v > chart.y.to ? NaN : v)), LIMIT);
     if (measured.length) draw(actual.at, measured, ACTUAL);
     draw(planned.time, ours, PLANNED);
-    now(g, chart);
+    needle(g, chart, moment());
     const over = exceeds(first, limit(initial));
     if (over) label(g, `simple: over ${name}`, chart.box.right - 3, chart.box.top + 2, { align: "right", base: "top", halo: true });
     return { state: { kind, plan: model.offer()?.plan, time: Math.round(moment() * 100) / 100, actual: measured.length, limit: known ? lowest : null, most: Math.max(...finite(ours), 0), over, within: !exceeds(ours, limits) }, age: 0, label: `${title}: planned at most ${number(Math.max(...finite(ours), 0), 1)}, limit ${known ? `at least ${number(lowest, 1)}` : "none"} ${unit}` };
@@ -85,7 +63,7 @@ const exceeds = (values, limits) => values.some((v, k) => v > limits[k]);
 
 function joints(g, width, height) {
   const document = model.document();
-  if (!document?.ok) return empty(g, width, height, "joints", model.planning() ? "planning" : "no trajectory");
+  if (!document?.ok) return empty(g, width, height, "joints");
   clear(g, width, height);
   const { roles, time } = document, actual = model.seen();
   const planned = roles.map((_, j) => document.joints.map((row) => deg(row[j])));
@@ -105,23 +83,13 @@ function joints(g, width, height) {
     if (measured[j].length) curve(g, chart, points(chart, actual.at, measured[j]), INKS[j % 6], 2.5);
     curve(g, chart, points(chart, time, planned[j]), INKS[j % 6], 1.5, [4, 3]);
   });
-  now(g, chart);
+  needle(g, chart, moment());
   return { state: { kind: "joints", plan: model.offer()?.plan, time: Math.round(moment() * 100) / 100, actual: actual?.at.length ?? 0 }, age: 0, label: "Joint angles, planned and as they were" };
 }
 
-const at = (times, values, t) => {
-  let k = times.findIndex((one) => one > t);
-  if (k < 0) k = times.length;
-  return values[Math.max(0, k - 1)];
-};
-
 const probing = (kind, lines) => (px, py) => {
-  const chart = charts[kind], document = model.document();
-  if (!chart || !document) return null;
-  const { box, x } = chart;
-  if (px < box.left || px > box.right || py < box.top || py > box.bottom) return null;
-  const t = x.inverse(px);
-  return [`${number(t, 1)} s`, ...lines(t, document)];
+  const document = model.document(), t = timeAt(charts[kind], px, py);
+  return t === null || !document ? null : [`${number(t, 1)} s`, ...lines(t, document)];
 };
 
 const values = (kind) => {
