@@ -3,7 +3,7 @@
 The machine is generated from its description: the rigid bodies of `stability.masses`, a belt a
 track (a box between two end wheels), its other bodies as they are, and along the bucket's edge a
 round bar. Belts run by letting their box slide and putting it back after every step: what touches
-it sees the belt's speed, and the box never leaves its place. MuJoCo is imported nowhere else.
+it sees the belt's speed, and the box stays in its place. MuJoCo is imported nowhere else.
 
 Units SI; the world's frame is any with z up; joints in the order of `Machine.joints`.
 """
@@ -99,6 +99,7 @@ class ContactWorld:
         # A drive holds its joint at 0 with a spring and a damper; a place ahead by their ratio
         # times a speed is that speed.
         ahead = 2.0 * RIGID * 2.0 * options.step
+        self._per_step = options.step / ahead
         r = self.crawler.radius
         self._per_speed = ahead * np.array([-1.0, 1.0 / r, 1.0 / r])
         self.edge_site = int(self.model.site("edge").id)
@@ -128,10 +129,12 @@ class ContactWorld:
     def step(self, control: Array) -> None:
         """`options.step` seconds on. control: (n + 6,) of `control`."""
         data = self.data
+        ahead = control[self._n :]
         data.ctrl[:] = control[: self._n]
-        self.model.eq_data[self._drives, 0] = control[self._n :]
+        self.model.eq_data[self._drives, 0] = ahead
         mujoco.mj_step(self.model, data)
-        data.qpos[self._belt_places] = 0.0
+        # What a belt should have run it is put back by; what it lags stays, and is made up for.
+        data.qpos[self._belt_places] -= ahead * self._per_step
 
     @property
     def time(self) -> float:

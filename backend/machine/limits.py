@@ -75,6 +75,7 @@ def _row(path: Path, name: str, row: Any) -> dict[str, float]:
         ("max_position", "has_position_limits"),
         ("max_velocity", "has_velocity_limits"),
         ("max_acceleration", "has_acceleration_limits"),
+        ("max_effort", "has_effort_limits"),
     ):
         if key not in row or not row.get(switch, True):
             continue
@@ -82,7 +83,7 @@ def _row(path: Path, name: str, row: Any) -> dict[str, float]:
         number = isinstance(value, (int, float)) and not isinstance(value, bool)
         if not number or not math.isfinite(value):
             raise InputError(f"{path}: joint_limits.{name}.{key} = {value!r} must be a number.")
-        if key in ("max_velocity", "max_acceleration") and value < 0:
+        if key in ("max_velocity", "max_acceleration", "max_effort") and value < 0:
             raise InputError(f"{path}: joint_limits.{name}.{key} = {value} must not be negative.")
         numbers[key] = float(value)
     return numbers
@@ -124,7 +125,11 @@ def actuated_joint(
     if acceleration <= 0.0:
         acceleration = _ACCELERATION[role]
         notes.append(f"{role}: acceleration of {acceleration:g} rad/s^2 is assumed")
-    return Joint(role, joint.name, lower, upper, velocity, acceleration)
+    torque = stated.get("max_effort", joint.effort or 0.0)
+    if sidecar is not None and sidecar.max_torque is not None:
+        torque = sidecar.max_torque
+    torque = torque if torque > 0.0 else math.inf
+    return Joint(role, joint.name, lower, upper, velocity, acceleration, torque)
 
 
 def _rate(radians: float | None, degrees: float | None, otherwise: float) -> float:

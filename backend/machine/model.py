@@ -6,6 +6,7 @@ Joint values are the URDF's own. Actuated joints come in the order of `ROLES`.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -32,6 +33,7 @@ class Joint:
     upper: float  # +inf when continuous
     max_velocity: float
     max_acceleration: float
+    max_torque: float = math.inf  # where none is stated [N m]
 
     @property
     def continuous(self) -> bool:
@@ -194,6 +196,11 @@ class Machine:
     def max_acceleration(self) -> Array:
         """(n,) [rad/s^2]."""
         return np.array([j.max_acceleration for j in self.joints])
+
+    @property
+    def max_torque(self) -> Array:
+        """(n,) [N m], infinite where none is stated."""
+        return np.array([j.max_torque for j in self.joints])
 
     @cached_property
     def link_matrices(self) -> Array:

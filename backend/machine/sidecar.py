@@ -62,6 +62,7 @@ class Limit(Table):
     max_acceleration_deg: Positive | None = None
     max_velocity: Positive | None = None  # [rad/s]
     max_acceleration: Positive | None = None  # [rad/s^2]
+    max_torque: Positive | None = None  # [N m]
 
 
 class BoxTable(Table):

@@ -57,6 +57,7 @@ class UrdfJoint:
     lower: float | None
     upper: float | None
     velocity: float | None
+    effort: float | None = None  # [N m], None where none is stated
 
 
 @dataclass(frozen=True)
@@ -228,9 +229,19 @@ def _joint(element: ET.Element, file: str) -> UrdfJoint:
     length = float(np.linalg.norm(axis))
     if length < 1e-9:
         raise InputError(f"{where}, axis: {axis.tolist()}; it must not be zero.")
-    lower, upper, velocity = _limit(element.find("limit"), kind, where)
+    limit = element.find("limit")
+    lower, upper, velocity = _limit(limit, kind, where)
+    effort = None if limit is None else _effort(limit, where)
     T = _origin(element, where)
-    return UrdfJoint(name, kind, ends[0], ends[1], T, axis / length, lower, upper, velocity)
+    return UrdfJoint(name, kind, ends[0], ends[1], T, axis / length, lower, upper, velocity, effort)
+
+
+def _effort(limit: ET.Element, where: str) -> float | None:
+    """None where none is stated; URDF wants one in any case, so that 0 says nothing."""
+    effort = _number(limit, "effort", math.nan, f"{where}, limit")
+    if effort < 0.0:
+        raise InputError(f"{where}, limit effort: {effort}; it must not be negative.")
+    return effort if effort > 0.0 else None
 
 
 def _limit(

@@ -171,7 +171,7 @@ def judge(
         torque = min(torque, 1.0 - float(shares.max()))
         tips = min(tips, float(one.margin.min()) - demands.margin)
         if own is not None:
-            own_left = min(own_left, own.least_along(q)[0] - OWN * _small(climber))
+            own_left = min(own_left, own.least_along(q)[0] - OWN * small(climber))
     bodies = min(bodies, own_left)
     slip = demands.friction - float(np.tan(parameters.alpha_f))
     values = (reach, joints, crawler, bodies, tips, torque, slip)
@@ -185,7 +185,7 @@ def own_bodies(climber: Climber) -> Sweep:
     return make_sweep(climber.machine, Obstacles(ground=False), OWN)
 
 
-def _small(climber: Climber) -> float:
+def small(climber: Climber) -> float:
     """Small machines keep less from themselves: by their arm, of two metres or more."""
     return min(1.0, climber.machine.max_reach / 2.0)
 

@@ -20,7 +20,7 @@ def inside(boxes: Boxes, points: np.ndarray, slack: float) -> np.ndarray:
 
 
 def test_shipped_machines():
-    assert shipped_machines() == ["ex13", "mini", "rail6"]
+    assert shipped_machines() == ["ex13", "mini", "rail6", "shovel"]
 
 
 @pytest.mark.parametrize("name", ["mini", "ex13"])
