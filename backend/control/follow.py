@@ -60,6 +60,8 @@ TOLERANCE = (0.10, float(np.radians(5.0)))
 """How far a base may be beside its place on the path, and turned from it [m, rad]."""
 DRIVES = 0.02
 """Track speeds above this share of the path's fastest drive [1]."""
+RUNS_ON = 0.5
+"""Share of the tolerance that tracks may use up until they stand: the arm stands at once."""
 MADE_UP = 0.5
 """Share of the path's own track speed by which it may be corrected."""
 
@@ -185,13 +187,15 @@ def advance(
     continuous: Array | None = None,
     T_site_root: Array | None = None,
     lead: float = 0.0,
+    fastest: float = np.inf,
 ) -> tuple[Follow, Array]:
     """The following cycle, and the wish (n,) [rad/s]; that of the tracks is in `Follow.tracks`.
 
     q: (n,) joints as seen [rad], NaN where unknown; lag: T [s]; moves: whether the dead-man is held
     and nothing pauses; dt: since the last cycle [s]; continuous: (n,) joints without ends, which
     are compared modulo a turn; T_site_root: (4, 4) as seen, None where unknown; lead: what the
-    tracks lag more than the joints [s].
+    tracks lag more than the joints [s]; fastest: of the tracks, from which they stand before the
+    base is off its way when everything is let go, see `stands_within` [m/s].
     """
     still = np.zeros(len(q))
     follow = replace(follow, tracks=np.zeros(2))
@@ -230,11 +234,21 @@ def advance(
     step = dt if dt < LONGEST else 0.0
     highest = 1.0 if follow.at == 0.0 else min(1.0, follow.pace + step / RAMP)
     pace = float(np.clip((0.5 * LOST - most) / (0.5 * LOST - KEPT), 0.0, highest))
+    driven = float(np.abs(path.tracks_at(follow.at + pace * lead)).max())
+    pace = min(pace, fastest / driven) if driven > 0.0 else pace
     at = min(follow.at + pace * step, path.duration)
     _, rates = path.at(at)
     needed, wish = pace * rates, pace * rates + GAIN * error
     tracks = pace * _driven(path, at + pace * lead, then, T_site_root)
     return replace(follow, at=at, pace=pace, wish=wish, needed=needed, tracks=tracks), wish
+
+
+def stands_within(path: Trajectory, lag: float, acceleration: float) -> float:
+    """The track speed v from which a machine stands within RUNS_ON of the path's tolerance [m/s]:
+    v lag + v^2 / (2 a). lag of its tracks [s]; acceleration, a: with which they brake [m/s^2].
+    """
+    way = RUNS_ON * path.tolerance[0]
+    return float(acceleration * (np.sqrt(lag**2 + 2.0 * way / acceleration) - lag))
 
 
 def beside(path: Trajectory, t: float, T_site_root: Array | None) -> str:

@@ -127,8 +127,8 @@ class Follows:
         lag = float(delay.total(n, age_of(state, snapshot.time))[0]) - 0.5 * delay.up
         lag = min(lag, MOST_LAG) if math.isfinite(lag) else MOST_LAG
         dt = now - found.cycled
-        body = None
-        if found.follow.trajectory.base is not None and state.pose.validity is Validity.VALID:
+        body, path = None, found.follow.trajectory
+        if path.base is not None and state.pose.validity is Validity.VALID:
             body = state.body
         following, rates = rules.advance(
             found.follow,
@@ -139,6 +139,7 @@ class Follows:
             np.array([joint.continuous for joint in machine.joints]),
             None if body is None else body.link_poses[0],
             delay.track_lag - delay.joint_lag,
+            rules.stands_within(path, delay.track_lag, machine.tracks.max_acceleration),
         )
         self._by_machine[name] = replace(found, follow=following, cycled=now)
         full, fast = machine.max_velocity, machine.tracks.max_speed
