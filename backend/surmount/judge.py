@@ -16,7 +16,7 @@ from backend.surmount.outline import (
     leans,
     rear_wheel,
 )
-from backend.surmount.records import SEQUENCES, Parameters, Spline, Step, Verdict
+from backend.surmount.records import LEFT, SEQUENCES, Parameters, Spline, Step, Verdict
 from backend.surmount.sequences import (
     Course,
     Joints,
@@ -73,9 +73,8 @@ def course_of(
     return sequence_2_2(climber, step, parameters, u)
 
 
-def worked_out(climber: Climber, step: Step, name: str, course: Course) -> Sequence:
-    """Joints, time, loads and margins of one course; NaN-free even where it cannot be reached."""
-    joints = joints_of(climber, course)
+def worked_out(climber: Climber, step: Step, name: str, course: Course, joints: Joints) -> Sequence:
+    """Time, loads and margins of one course; finite even where it cannot be reached."""
     duration = duration_of(climber, course, joints.q)
     weights = weights_of(climber, joints.T, joints.q)
     lines, lines_z, bearing = _lines(climber, step, course)
@@ -138,11 +137,13 @@ def judge(
     rows: int = ROWS,
     own: Sweep | None = None,
     names: tuple[str, ...] = SEQUENCES,
+    quick: bool = False,
 ) -> tuple[Verdict, tuple[Sequence, ...]]:
-    """What holds, with the three sequences; these are empty where alpha_f is impossible.
+    """What holds, with the sequences; these are empty where alpha_f is impossible.
 
     own: of `own_bodies`, made once for many parameters; own bodies are not looked at when None.
-    names: of the sequences that are judged.
+    names: of the sequences that are judged. quick: nothing more is worked out once something does
+    not hold, and what was not is infinite.
     """
     low, high = leans(step.height, climber.a, climber.r)
     if not low - ROUNDING <= parameters.alpha_f <= high + ROUNDING:
@@ -152,32 +153,39 @@ def judge(
             f"{np.degrees(high):.2f} degrees"
         )
         off = min(parameters.alpha_f - low, high - parameters.alpha_f)
-        return Verdict(off, off, off, off, off, off, off, kind="reach", why=why), ()
+        return Verdict(dict.fromkeys(LEFT, float(off)), kind="reach", why=why), ()
     u = np.linspace(0.0, 1.0, rows)
-    made = tuple(
-        worked_out(climber, step, name, course_of(name, climber, step, parameters, u, spline))
-        for name in names
-    )
-    demands, machine = climber.demands, climber.machine
-    reach, joints, crawler, bodies, torque, tips = (np.inf,) * 6
-    own_left = np.inf
-    for one in made:
-        reach = min(reach, _reach(climber, one))
-        q = one.joints.q
-        joints = min(joints, float(np.minimum(q - machine.lower, machine.upper - q).min()))
-        crawler = min(crawler, float(_belts(climber, step, one.course).min()))
-        bodies = min(bodies, _bodies(climber, step, one))
+    demands = climber.demands
+    left = dict.fromkeys(LEFT, np.inf)
+    left["room"] = _room(climber, step, parameters, names)
+    left["slip"] = demands.friction - float(np.tan(parameters.alpha_f))
+    made: list[Sequence] = []
+    energy = 0.0
+    for name in names:
+        course = course_of(name, climber, step, parameters, u, spline)
+        joints = joints_of(climber, course)
+        _least(left, "reach", _reach(climber, course, joints))
+        _least(left, "joints", _ends(climber, joints))
+        _least(left, "crawler", _belts(climber, step, course))
+        if quick and min(left.values()) < -ROUNDING:
+            break
+        one = worked_out(climber, step, name, course, joints)
+        made.append(one)
         shares = np.abs(one.loads.torques) / demands.torques
-        torque = min(torque, 1.0 - float(shares.max()))
-        tips = min(tips, float(one.margin.min()) - demands.margin)
+        _least(left, "torque", 1.0 - float(shares.max()))
+        _least(left, "margin", float(one.margin.min()) - demands.margin)
+        _least(left, "bodies", _bodies(climber, step, one))
         if own is not None:
-            own_left = min(own_left, own.least_along(q)[0] - OWN * small(climber))
-    bodies = min(bodies, own_left)
-    slip = demands.friction - float(np.tan(parameters.alpha_f))
-    values = (reach, joints, crawler, bodies, tips, torque, slip)
-    kind, why = _words(values, climber, step, parameters)
-    energy = sum(slow_energy(s.loads, s.joints.q, s.course.belt, demands.friction) for s in made)
-    return Verdict(*values, energy=float(energy), kind=kind, why=why), made
+            kept = own.least_along(joints.q)[0] - OWN * small(climber)
+            _least(left, "bodies", kept)
+        energy += slow_energy(one.loads, joints.q, course.belt, demands.friction)
+    kind, why = _words(left, climber)
+    whole = energy if len(made) == len(names) else np.nan
+    return Verdict(left, whole, kind, why), tuple(made)
+
+
+def _least(left: dict[str, float], name: str, value: float) -> None:
+    left[name] = min(left[name], value)
 
 
 def own_bodies(climber: Climber) -> Sweep:
@@ -190,12 +198,29 @@ def small(climber: Climber) -> float:
     return min(1.0, climber.machine.max_reach / 2.0)
 
 
-def _reach(climber: Climber, one: Sequence) -> float:
+def _room(climber: Climber, step: Step, parameters: Parameters, names: tuple[str, ...]) -> float:
+    """What is left of the ground before the edge and of the top, for tracks and bucket [m]."""
+    side = climber.a + climber.r
+    keep = 2.0 * climber.edge[0]
+    left = [np.inf]
+    if SEQUENCES[0] in names:
+        left.append(step.before - parameters.p1 - side)
+        left += [step.depth - parameters.p2 - keep, parameters.p2 - keep]
+    if SEQUENCES[2] in names:
+        left += [step.before - parameters.p3 - keep, step.depth - parameters.p4 - side]
+    return float(min(left))
+
+
+def _ends(climber: Climber, joints: Joints) -> float:
+    """What is left to the joints' ends [rad]."""
+    q, machine = joints.q, climber.machine
+    return float(np.minimum(q - machine.lower, machine.upper - q).min())
+
+
+def _reach(climber: Climber, course: Course, joints: Joints) -> float:
     """What is left of (22) and (23), as a share of the arm's length."""
-    _, l2, l3, _ = climber.machine.sun.lengths
-    T, course = one.joints.T, one.course
-    pivot = _boom_pivot(climber, T, course.way)
-    l4 = climber.machine.sun.lengths[3]
+    _, l2, l3, l4 = climber.machine.sun.lengths
+    pivot = _boom_pivot(climber, joints.T, course.way)
     phi = climber.demands.attitude
     joint = course.held - l4 * np.array([course.way * np.cos(phi), np.sin(phi)])
     length = np.linalg.norm(joint - pivot, axis=1)
@@ -214,41 +239,50 @@ def _boom_pivot(climber: Climber, T: Array, way: int) -> Array:
     return np.asarray(placed[:, [0, 2]])
 
 
-def _belts(climber: Climber, step: Step, course: Course) -> Array:
-    return belt_clearance(course.x, course.z, course.alpha, step.height, climber.a, climber.r)
+def _belts(climber: Climber, step: Step, course: Course) -> float:
+    """What is left between belts and risers [m]."""
+    a, r = climber.a, climber.r
+    return min(
+        float(belt_clearance(course.x - x, course.z, course.alpha, h, a, r).min())
+        for x, h in step.risers
+    )
+
+
+def clearance_of(placed: Array, step: Step) -> Array:
+    """(..., B) of bodies with corners (..., B, 8, 3) to risers, tops and ground [m]."""
+    flat = placed[..., [0, 2]]
+    found = [body_clearance(flat - np.array([x, 0.0]), h) for x, h in step.risers]
+    return np.asarray(np.minimum.reduce(found))
 
 
 def _bodies(climber: Climber, step: Step, one: Sequence) -> float:
     """What is left of the clearance; the bucket's own bodies stand on the ground."""
-    placed = climber.bodies(one.joints.T, one.joints.q)[..., [0, 2]]
-    left = body_clearance(placed, step.height).min(axis=0)
+    left = clearance_of(climber.bodies(one.joints.T, one.joints.q), step).min(axis=0)
     asked = np.where(climber.of_bucket, -SUNK, climber.demands.clearance)
     return float((left - asked).min())
 
 
-def _words(
-    values: tuple[float, ...], climber: Climber, step: Step, parameters: Parameters
-) -> tuple[str, str]:
+def _words(left: dict[str, float], climber: Climber) -> tuple[str, str]:
     """The first that does not hold, in the order in which they are asked."""
-    reach, joints, crawler, bodies, tips, torque, slip = values
     demands = climber.demands
-    if reach < 0.0:
+    if left["room"] < -ROUNDING:
+        short = -left["room"]
+        return "room", f"the ground before the edge or its top is {short:.3f} m too short"
+    if left["reach"] < 0.0:
         return "reach", "the arm does not reach from the crawler to the bucket all the way"
-    if joints < -ROUNDING:
-        return "reach", f"a joint would have to go {np.degrees(-joints):.1f} degrees past its end"
-    if crawler < -1e-6:
-        return "collision", f"the crawler would be {-crawler:.3f} m inside the step"
-    if bodies < 0.0:
-        return (
-            "collision",
-            f"a body would come {demands.clearance + bodies:.3f} m near to step, ground or another "
-            f"body, nearer than allowed",
-        )
-    if tips < 0.0:
-        left = demands.margin + tips
-        return "stability", f"it would come within {left:.3f} m of tipping over"
-    if torque < 0.0:
-        return "torque", f"a joint would need {100.0 * (1.0 - torque):.0f} % of its torque"
-    if slip < 0.0:
+    if left["joints"] < -ROUNDING:
+        past = np.degrees(-left["joints"])
+        return "reach", f"a joint would have to go {past:.1f} degrees past its end"
+    if left["crawler"] < -1e-6:
+        return "collision", f"the crawler would be {-left['crawler']:.3f} m inside the step"
+    if left["bodies"] < 0.0:
+        near = demands.clearance + left["bodies"]
+        return "collision", f"a body would come within {near:.3f} m of step, ground or another body"
+    if left["margin"] < 0.0:
+        near = demands.margin + left["margin"]
+        return "stability", f"it would come within {near:.3f} m of tipping over"
+    if left["torque"] < 0.0:
+        return "torque", f"a joint would need {100.0 * (1.0 - left['torque']):.0f} % of its torque"
+    if left["slip"] < 0.0:
         return "stability", "it would slide off the edge: the lean is steeper than friction holds"
     return "", ""

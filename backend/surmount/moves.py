@@ -16,10 +16,9 @@ import numpy as np
 from backend.machine.kinematics import end_point
 from backend.planning.trajectory.sweep import OWN, Sweep
 from backend.spatial.types import Array
-from backend.surmount.judge import SUNK, Sequence, small
+from backend.surmount.judge import SUNK, Sequence, clearance_of, small
 from backend.surmount.laws import smooth_step
 from backend.surmount.machine import Climber
-from backend.surmount.outline import body_clearance
 from backend.surmount.records import Motion, Phase, Step
 from backend.surmount.statics import weights_of
 from backend.surmount.support import margin, zero_moment_points
@@ -110,13 +109,13 @@ def looked_at(
     z = np.broadcast_to(stance.lines_z, (len(q), 2))
     lines = np.broadcast_to(stance.lines, (len(q), 2, 3))
     points = zero_moment_points(weights.centre, np.zeros((len(q), 3)), z, lines[..., 0])
-    placed = climber.bodies(T, q)[..., [0, 2]]
+    placed = climber.bodies(T, q)
     asked = np.full(len(climber.beside), climber.demands.clearance)
     if touching:
         asked[climber.of_bucket] = -SUNK
     # The undercarriage's own bodies were judged where the crawler came to stand.
     moving = np.any(climber.machine.body_joints[climber.beside], axis=1)
-    left = body_clearance(placed, step.height).min(axis=0) - asked
+    left = clearance_of(placed, step).min(axis=0) - asked
     clear = float(left[np.asarray(moving)].min())
     if own is not None:
         clear = min(clear, own.least_along(q)[0] - OWN * small(climber))

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import astuple, dataclass, field
+from collections.abc import Mapping
+from dataclasses import astuple, dataclass
 
 import numpy as np
 
@@ -17,20 +18,34 @@ MOVES = ("reach", "turn", "stow")
 
 @dataclass(frozen=True)
 class Step:
-    """height [m] over the ground before it; depth of its top across the edge [m].
+    """height [m] over the ground before it; depth of its top across the edge; before: length of the
+    level ground before it; beyond: height over the top of another step where the top ends, 0 where
+    the ground falls or nothing is known [m].
 
     Step frame: x across the edge towards the top, y along it to the left, z up; the edge E is at
-    x = 0, z = height. Raises InputError unless both are above 0.
+    x = 0, z = height. Raises InputError unless height, depth and before are above 0.
     """
 
     height: float
     depth: float = math.inf
+    before: float = math.inf
+    beyond: float = 0.0
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.height) and self.height > 0.0):
             raise InputError(f"a step's height is {self.height:g} m; allowed is more than 0.")
-        if not self.depth > 0.0:
-            raise InputError(f"a step's depth is {self.depth:g} m; allowed is more than 0.")
+        for name in ("depth", "before"):
+            if not getattr(self, name) > 0.0:
+                value = getattr(self, name)
+                raise InputError(f"a step's {name} is {value:g} m; allowed is more than 0.")
+
+    @property
+    def risers(self) -> tuple[tuple[float, float], ...]:
+        """(x, height) of this edge and of the one beyond [m]."""
+        own = (0.0, self.height)
+        if self.beyond > 0.0 and math.isfinite(self.depth):
+            return own, (self.depth, self.height + self.beyond)
+        return (own,)
 
 
 @dataclass(frozen=True)
@@ -103,7 +118,7 @@ class Phase:
 @dataclass(frozen=True, eq=False)
 class Motion:
     """time: (m,) from 0 [s]; q, rates: (m, n) [rad, rad/s]; belts: (m,) speed of both over the
-    crawler, in its own forward direction [m/s]; T_step_root: (m, 4, 4); support: (m, 2, 2), each of
+    crawler, along x of the frame [m/s]; T_step_root: (m, 4, 4); support: (m, 2, 2), each of
     the two lines that bear it: x [m] and half width [m], rear one first; held: (m, 2) which point
     the bucket's edge keeps, x and z [m], NaN where none; torques: (m, n) to be expected [N m];
     phases: in order.
@@ -129,28 +144,30 @@ class Motion:
         return np.minimum(np.searchsorted(ends, self.time - 1e-9), len(ends) - 1)
 
 
+LEFT = ("room", "reach", "joints", "crawler", "bodies", "margin", "torque", "slip")
+
+
 @dataclass(frozen=True)
 class Verdict:
-    """How well parameters keep to what is demanded: each value is what is left, negative where it
-    does not hold. reach: of the triangle's lengths, as a share of the arm (22), (23); joints: to
-    the joints' ends [rad]; crawler: of the belts to the step [m]; bodies: of the other bodies to
-    step and ground beyond the clearance [m]; margin: beyond the one demanded [m]; torque: share of
-    the joints' limits that is left (20); slip: of the friction that is left at belts and bucket.
-    energy: quasi-static [J]; why: in words what does not hold first, empty where all does.
+    """How well parameters keep to what is demanded: of each of LEFT what is left, negative where it
+    does not hold. room: of the ground before the edge and of the top, for tracks and bucket [m];
+    reach: of the triangle's lengths, as a share of the arm (22), (23); joints: to the joints' ends
+    [rad]; crawler: of the belts to the step [m]; bodies: of the other bodies to step and ground
+    beyond the clearance [m]; margin: beyond the one demanded [m]; torque: share of the joints'
+    limits that is left (20); slip: of the friction that is left at belts and bucket. energy:
+    quasi-static [J]; kind, why: what does not hold first, in words, empty where all does.
     """
 
-    reach: float
-    joints: float
-    crawler: float
-    bodies: float
-    margin: float
-    torque: float
-    slip: float
+    left: Mapping[str, float]
     energy: float = math.nan
     kind: str = ""
     why: str = ""
-    notes: tuple[str, ...] = field(default=())
 
     @property
     def holds(self) -> bool:
         return not self.why
+
+    @property
+    def values(self) -> Array:
+        """(8,) in the order of LEFT."""
+        return np.array([self.left[name] for name in LEFT])

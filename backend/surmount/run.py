@@ -67,11 +67,14 @@ def options_of(climber: Climber) -> Options:
 
 
 def terrain(climber: Climber, step: Step) -> Boxes:
-    """The step as a box, in the step frame."""
+    """Risers as boxes in the step frame: each reaches to the end of all, the next stands in it."""
     wide = WIDE * climber.machine.max_reach
-    deep = min(step.depth, 2.0 * wide)
-    half = np.array([[0.5 * deep, wide, 0.5 * step.height]])
-    return Boxes(np.array([[0.5 * deep, 0.0, 0.5 * step.height]]), np.eye(3)[None], half)
+    risers = step.risers
+    # A lone top ends where it ends; before another riser it goes on under that.
+    end = min(step.depth, 2.0 * wide) if len(risers) == 1 else risers[-1][0] + 2.0 * wide
+    half = np.array([[0.5 * (end - x), wide, 0.5 * h] for x, h in risers])
+    centres = np.array([[0.5 * (end + x), 0.0, 0.5 * h] for x, h in risers])
+    return Boxes(centres, np.broadcast_to(np.eye(3), (len(half), 3, 3)).copy(), half)
 
 
 def world_of(climber: Climber, step: Step) -> ContactWorld:

@@ -41,6 +41,7 @@ import * as drive from "./drive/start.js";
 import * as gauge from "./gauge/panel.js";
 import * as useCases from "./use_cases/panel.js";
 import * as trajectory from "./trajectory/panel.js";
+import * as surmount from "./surmount/panel.js";
 
 readSizes();
 
@@ -101,6 +102,7 @@ function onKey(event) {
   else if (event.key === "v" || event.key === "V") toggleLayout();
   else if (event.key === "f" || event.key === "F") toggleFullScreen();
   else if (event.key === "c" || event.key === "C") toggleCameras();
+  else if (event.key === "u" || event.key === "U") surmount.toggleSurmount(trajectory.closeTrajectory);
   else if (event.key === "b" || event.key === "B") toggleMachines();
   else if (sessionKey(event)) event.stopPropagation(); // the scene's own keys would turn its camera
   else if (event.key === "Escape") {
@@ -110,6 +112,7 @@ function onKey(event) {
     gauge.closeGauge();
     useCases.closeUseCases();
     trajectory.closeTrajectory();
+    surmount.closeSurmount();
     hover.hide();
     ghost.unpin();
     alarm.showList(false);
@@ -165,7 +168,8 @@ for (const s of figures) {
   hover.watch(s);
   PERIOD.set(s, 90);
 }
-for (const s of trajectory.startTrajectory(socket.send, () => { plots.plan.dirty = true; })) {
+const planAnew = () => { plots.plan.dirty = true; };
+for (const s of [...trajectory.startTrajectory(socket.send, planAnew, surmount.closeSurmount), ...surmount.startSurmount(socket.send, planAnew, trajectory.closeTrajectory)]) {
   hover.watch(s);
   PERIOD.set(s, 90);
 }
@@ -231,6 +235,7 @@ function tick() {
   gauge.update();
   useCases.update();
   trajectory.update();
+  surmount.update();
   ghost.age();
   hover.refresh();
 }

@@ -14,6 +14,7 @@ import {
 } from "./plan_layers.js";
 import { drawing, paint as paintDrawing } from "../gauge/drawing.js";
 import { drawTrajectory } from "../trajectory/draw.js";
+import { drawSurmount } from "../surmount/draw.js";
 import { inForce } from "../gauge/model.js";
 import { insideWords } from "../people/model.js";
 import { areaKey, drawAreas, hasAreas, tellAreas } from "./plan_areas.js";
@@ -104,7 +105,7 @@ function paint(g, width, height, dpr) {
   north(g, turn);
   const note = layers.length ? nearestNote(g, exact, stale, layers) : null;
   if (exact && !layers.length) zoneNote(g, exact, stale);
-  const trajectory = drawTrajectory(g);
+  const trajectory = drawTrajectory(g), surmount = drawSurmount(g);
   paintDrawing(g);
   g.restore();
   if (!view.tracksUp) gridText(g, grid, height, t);
@@ -124,7 +125,7 @@ function paint(g, width, height, dpr) {
   return {
     state: {
       own: state.own, partner: state.partner, playback: replaying(), width: view.width, centre: view.centre, up: view.tracksUp ? "tracks" : "north",
-      base: own.position?.slice(0, 2), zone: zone.length, zones, around: drawn, note, shown: how, zone_stale: stale, exit, nearest, people: seen, areas, stability, gauge: inForce(), trajectory, machines: names().filter((name) => machine(name)?.outlines).length,
+      base: own.position?.slice(0, 2), zone: zone.length, zones, around: drawn, note, shown: how, zone_stale: stale, exit, nearest, people: seen, areas, stability, gauge: inForce(), trajectory, surmount, machines: names().filter((name) => machine(name)?.outlines).length,
     },
     age,
     label: `Plan of ${view.width} m: ${nameOf(state.own)} base at ${own.position_projected ? own.position_projected.slice(0, 2).map((v) => v.toFixed(1)).join(", ") : "unknown"}; nearest distance to ${nameOf(state.partner)} ${nearest === null ? "unknown" : metres(nearest)}${exit ? `; base inside the warning zone by ${metres(exit)}` : ""}${layers.length ? `; ${nearestText(exact, stale, layers)}` : exact ? `; ${distanceText(exact)}` : ""}${[...stabilityWords(), ...insideWords()].map((words) => `; ${words}`).join("")}`,

@@ -131,7 +131,7 @@ export function outlines(g, name) {
 }
 
 /** The rectangle of an upright box on the ground. */
-function footprint({ center, rotation, half_extents: half }) {
+export function footprint({ center, rotation, half_extents: half }) {
   if (!center || !half) return null;
   const R = rotation ?? [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
   return [[1, 1], [-1, 1], [-1, -1], [1, -1]].map(([a, b]) => [0, 1].map((k) => center[k] + a * half[0] * R[k][0] + b * half[1] * R[k][1]));

@@ -90,8 +90,8 @@ export function closeTrajectory() {
   redraw();
 }
 
-/** plan: draws the plan view anew. Returns the surfaces of its plots. */
-export function startTrajectory(send, plan) {
+/** plan: draws the plan view anew; others: closes what else stands in this place. Returns the surfaces of its plots. */
+export function startTrajectory(send, plan, others) {
   const chosen = () => {
     update();
     redraw();
@@ -103,7 +103,11 @@ export function startTrajectory(send, plan) {
   };
   model.startModel(send);
   startDrawing(chosen);
-  $("trajectory-open").addEventListener("click", () => (open ? closeTrajectory() : openTrajectory()));
+  $("trajectory-open").addEventListener("click", () => {
+    if (open) return closeTrajectory();
+    others();
+    return openTrajectory();
+  });
   $("tj-close").addEventListener("click", closeTrajectory);
   $("tj-plan").addEventListener("click", ask);
   $("tj-accept").addEventListener("click", () => {
