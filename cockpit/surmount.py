@@ -16,6 +16,7 @@ from backend.errors import InputError
 from backend.shell.app.wire import dumps
 from backend.shell.surmount_pool import Kept, Pool
 from backend.site.site import load_site
+from backend.surmount.halves import one_by_one
 from cockpit.states import States, read_text
 
 
@@ -28,7 +29,9 @@ def run_surmount(path: Path, site_name: str | None, keep: Path | None, as_json: 
         raise InputError(f"{path}: is not JSON: {error}.") from error
     task = parse_surmount_task(data, str(path))
     _, machines = states.parse(task.state.model_dump_json(), f"{path}: state")
-    pool = Pool(Kept(keep))
+    # A dozen simulations are done before processes have begun.
+    few = task.effort == "quick" and keep is None
+    opened = one_by_one if few else Pool(Kept(keep))
     columns = TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn()
     with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
         bar = progress.add_task("a way", total=None)
@@ -37,7 +40,9 @@ def run_surmount(path: Path, site_name: str | None, keep: Path | None, as_json: 
             progress.update(bar, completed=done, total=of or None, description=words)
             return True
 
-        made = surmount_document(task, machines, states.frame, pool, told, str(path), states.bodies)
+        made = surmount_document(
+            task, machines, states.frame, opened, told, str(path), states.bodies
+        )
     print(dumps(made.model_dump()) if as_json else words_of(made))
 
 

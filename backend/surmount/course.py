@@ -42,7 +42,10 @@ class Leg:
 
 
 def legs(edges: tuple[Edge, ...], depth: float = math.inf) -> tuple[Leg, ...]:
-    """depth: of the level ground behind the last edge [m]. Raises InputError unless the edges follow each other and rise or fall."""
+    """depth: of the level ground behind the last edge [m].
+
+    Raises InputError unless the edges follow each other and rise or fall.
+    """
     found, ground = [], 0.0
     for k, edge in enumerate(edges):
         if not (math.isfinite(edge.x) and math.isfinite(edge.rise)) or edge.rise == 0.0:
