@@ -252,9 +252,12 @@ def _belts(climber: Climber, step: Step, course: Course) -> float:
 
 
 def clearance_of(placed: Array, step: Step) -> Array:
-    """(..., B) of bodies with corners (..., B, 8, 3) to risers, tops and ground [m]."""
+    """(m - 1, B) of bodies with corners (m, B, 8, 3) to risers, tops and ground [m]: of what each
+    covers on its way from one row to the next, taken as straight.
+    """
     flat = placed[..., [0, 2]]
-    found = [body_clearance(flat - np.array([x, 0.0]), h) for x, h in step.risers]
+    swept = np.concatenate([flat[:-1], flat[1:]], axis=-2) if len(flat) > 1 else flat
+    found = [body_clearance(swept - np.array([x, 0.0]), h) for x, h in step.risers]
     return np.asarray(np.minimum.reduce(found))
 
 
