@@ -52,8 +52,16 @@ const told = (kind, more) => ({ kind, plan: model.offer()?.plan ?? null, time: r
 const LINES = {
   joints: { title: "joint angles, °", unit: "°", digits: 1, rows: (f) => f.joints, of: deg },
   rates: { title: "joint rates, °/s", unit: "°/s", digits: 1, rows: (f) => f.rates, of: deg },
-  torques: { title: "torques |τ|, N m", unit: "N m", digits: 0, rows: (f) => f.torques, of: Math.abs },
+  torques: { title: "torques |τ|, N m", unit: "N m", digits: 1, rows: (f) => f.torques, of: Math.abs },
 };
+const LARGE = 2000; // N m, from which on it is kN m
+
+/** How a kind is written: large torques in kN m. */
+function written(kind, figures) {
+  const line = LINES[kind];
+  if (kind !== "torques" || Math.max(...figures.torques.flat().map(Math.abs)) < LARGE) return { ...line, limit: (v) => v };
+  return { ...line, title: "torques |τ|, kN m", unit: "kN m", of: (v) => Math.abs(v) / 1000, limit: (v) => v / 1000 };
+}
 
 /** What the sensors saw of a joint, in the turns of the plan; none of rates and torques. */
 function measured(kind, j, planned) {
@@ -67,11 +75,11 @@ function lines(g, width, height, kind) {
   const document = model.document(), figures = document?.figures;
   if (!figures?.time.length) return nothing(g, width, height, kind);
   clear(g, width, height);
-  const { title, unit, rows, of } = LINES[kind], { roles } = document;
+  const { title, unit, rows, of, limit: sized } = written(kind, figures), { roles } = document;
   const curves = roles.map((_, j) => column(rows(figures), j, of));
   const actual = model.seen(), was = curves.map((values, j) => measured(kind, j, values));
   // Each joint's limit as far up as matters; the swing turns on its bearing and carries nothing.
-  const limits = kind === "torques" ? roles.map((_, j) => figures.torque_limits[j] ?? NaN) : [];
+  const limits = kind === "torques" ? roles.map((_, j) => sized(figures.torque_limits[j] ?? NaN)) : [];
   const most = Math.max(...finite(curves.flat()), 0);
   const drawn = limits.map((limit) => (limit <= HIGHEST * most ? limit : NaN));
   const all = [...curves.flat(), ...was.flat(), ...drawn].filter(Number.isFinite);
@@ -82,7 +90,7 @@ function lines(g, width, height, kind) {
     ...(was.flat().length ? [[swatches.line(C.remote, null, 3), "actual"]] : []),
   ];
   const legends = entries(g, width, height, list);
-  const chart = (charts[kind] = overTime(g, width, height, legends, upward(Math.min(...all), Math.max(...all), height < 150 ? 3 : 5), title, unit, document.duration, kind === "torques" ? 3.6 : 2.4));
+  const chart = (charts[kind] = overTime(g, width, height, legends, upward(Math.min(...all), Math.max(...all), height < 150 ? 3 : 5), title, unit, document.duration, 2.4));
   bands(g, chart, document.phases);
   drawn.forEach((limit, j) => {
     if (!Number.isFinite(limit)) return;
@@ -159,8 +167,8 @@ function probing(which) {
     if (t === null) return null;
     const head = [`${number(t, 1)} s · ${model.phase(t)?.name ?? ""}`];
     if (kind === "energy") return [...head, `${number(at(figures.time, figures.energy, t), 1)} J so far`];
-    const { unit, rows, of, digits } = LINES[kind], row = at(figures.time, rows(figures), t);
-    const limit = (j) => (kind === "torques" && Number.isFinite(figures.torque_limits[j]) ? ` of ${number(figures.torque_limits[j], 0)}` : "");
+    const { unit, rows, of, digits, limit: sized } = written(kind, figures), row = at(figures.time, rows(figures), t);
+    const limit = (j) => (kind === "torques" && Number.isFinite(figures.torque_limits[j]) ? ` of ${number(sized(figures.torque_limits[j]), digits)}` : "");
     return [...head, ...document.roles.map((role, j) => `${role} ${number(of(row[j]), digits)}${limit(j)} ${unit}`)];
   };
 }
