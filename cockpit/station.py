@@ -160,6 +160,7 @@ class Station:
             driven=self.driving.driven,
             gauge=self.gauge.choice,
             people=self._seen,
+            surmounting=self.driving.surmounting,
         )
         frames = Frames(self.hub, self.document)
         relay = Relay(session, self.hub, self._texts, frames.images)

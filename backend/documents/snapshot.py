@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -58,6 +59,7 @@ def snapshot_document(snapshot: Snapshot, config: Config) -> dict[str, Any]:
         "stability": {
             name: stability_document(found) for name, found in snapshot.stability.items()
         },
+        **_surmounting(snapshot),
         "images": {
             key: {
                 "state_time": stamp.state_time,
@@ -72,6 +74,13 @@ def snapshot_document(snapshot: Snapshot, config: Config) -> dict[str, Any]:
             "lost": snapshot.health.lost,
         },
     }
+
+
+def _surmounting(snapshot: Snapshot) -> dict[str, Any]:
+    """What machines climb by plan, where any does."""
+    if not snapshot.surmounting:
+        return {}
+    return {"surmounting": {name: asdict(one) for name, one in snapshot.surmounting.items()}}
 
 
 def machine_document(state: MachineState, machine: Machine, config: Config) -> dict[str, Any]:

@@ -12,6 +12,7 @@ from backend.pipeline.people_records import People, Seen
 from backend.safety.alarms import Alarm
 from backend.safety.area_records import WorkingArea
 from backend.safety.record import Concern
+from backend.safety.surmounting import Surmounting
 from backend.site.gauge_choice import NO_CHOICE, GaugeChoice
 from backend.spatial.boxes import Boxes
 from backend.spatial.types import Array
@@ -55,6 +56,7 @@ class Inputs:
     driven: tuple[str, ...] = ()  # machines that somebody here controls: their brakes are judged
     gauge: GaugeChoice | None = None  # what operators chose of it; None: as before
     people: Seen | None = None  # of the newest scan; None: none since
+    surmounting: Mapping[str, Surmounting] = field(default_factory=dict)  # by machine, what is on
 
 
 @dataclass(frozen=True)
@@ -191,3 +193,4 @@ class Snapshot:
     gauge: GaugeInForce = AS_THE_SITE_SAYS
     people: People | None = None  # None on a site without LiDARs
     stability: dict[str, Stability] = field(default_factory=dict)  # empty where it is not judged
+    surmounting: Mapping[str, Surmounting] = field(default_factory=dict)  # by machine, in force

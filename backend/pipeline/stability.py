@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from types import MappingProxyType
 
 import numpy as np
 
@@ -20,9 +21,11 @@ from backend.fusion.pose import FusedPose, Validity
 from backend.machine.model import Machine
 from backend.pipeline.config import Config
 from backend.pipeline.records import MachineState
+from backend.pipeline.surmounting import RULES, stability_on, tip_over_on
 from backend.safety import tip_over
 from backend.safety.limits import Delay
 from backend.safety.record import Concern
+from backend.safety.surmounting import Surmounting
 from backend.safety.tip_over import TipOver
 from backend.spatial.identity import ByIdentity
 from backend.spatial.types import Array
@@ -46,6 +49,7 @@ one is covered as if the drives answered that much later.
 """
 ADVISED = 0.5
 """Below this share what may be done is told to those, too, who only look."""
+NOBODY: Mapping[str, Surmounting] = MappingProxyType({})
 _SAMPLES = 10  # of the joints in the window of a rate, for its noise
 
 
@@ -88,19 +92,31 @@ def following(
 
 
 def standing(
-    memory: Standing, machines: Mapping[str, MachineState], now: float, config: Config
+    memory: Standing,
+    machines: Mapping[str, MachineState],
+    now: float,
+    config: Config,
+    climbing: Mapping[str, Surmounting] = NOBODY,
 ) -> tuple[Standing, dict[str, Stability]]:
-    """By machine, and the memory of it. memory: with the rates of this cycle.
+    """By machine, and the memory of it. memory: with the rates of this cycle; climbing: machines
+    that stand on what their plans say, which are judged in every cycle.
 
     Of several machines each is judged every other cycle, in periods that begin at fixed times: what
     is shown then does not depend on when one began to look.
     """
     rules = config.stability
+    found: dict[str, Stability] = {
+        name: stability_on(
+            name, given, machines[name], _payload(name, config, rules or RULES), config
+        )
+        for name, given in climbing.items()
+    }
     if rules is None:
-        return memory, {}
-    found: dict[str, Stability] = {}
+        return memory, found
     kept: dict[str, tuple[int, Stability]] = {}
     for k, (name, state) in enumerate(machines.items()):
+        if name in climbing:
+            continue
         why = _why(state, name, config)
         if why:
             found[name] = Stability(why)
@@ -122,19 +138,27 @@ def concerns(
     driven: frozenset[str],
     now: float,
     config: Config,
+    climbing: Mapping[str, Surmounting] = NOBODY,
 ) -> tuple[Standing, tuple[Concern, ...]]:
-    """Of the own machines; none of a machine about which nothing is known, unless required.
+    """Of the own machines; none of a machine about which nothing is known, unless required. Those
+    that climb by plan always have one.
 
     Limits are worked out for machines that somebody drives, and as advice below `ADVISED`; every
     `LEFT_PERIOD`, kept in the memory that is returned.
     """
     rules = config.stability
+    made = [
+        tip_over_on(name, given, found[name], rules or RULES, now, config)
+        for name, given in climbing.items()
+        if name in config.own
+    ]
     if rules is None:
-        return memory, ()
-    made = []
+        return memory, tuple(made)
     left: dict[str, tuple[int, Array, Array]] = {}
     period = math.floor(now / LEFT_PERIOD)
     for name in config.own:
+        if name in climbing:
+            continue
         state, label = found[name], config.labels[name]
         machine = config.machines[name]
         if state.reason:

@@ -17,6 +17,7 @@ from backend.fusion.pose import FusedPose, Validity
 from backend.fusion.rig import Rig, make_rig
 from backend.fusion.samples import Sample
 from backend.fusion.streams import Streams, ingest
+from backend.pipeline import surmounting
 from backend.pipeline.braking import approach_of, unknown_ages
 from backend.pipeline.config import Config
 from backend.pipeline.margins import machine_margins
@@ -103,8 +104,9 @@ def step(state: State, inputs: Inputs, now: float, config: Config) -> tuple[Stat
         )
         for name in config.own
     )
+    climbing = surmounting.in_force(inputs.surmounting, machines, now)
     for name in config.own:
-        around = site_of(name, gauge, config)
+        around = surmounting.without(site_of(name, gauge, config), climbing.get(name))
         if len(around.boxes):
             driven_here = name in driven
             concerns += (site_concern(name, machines[name], now, config, driven_here, around),)
@@ -112,9 +114,23 @@ def step(state: State, inputs: Inputs, now: float, config: Config) -> tuple[Stat
     stood = state.standing
     if config.stability is not None:
         stood = standing_after(state.standing, machines, now, config)
-    stood, stability = standing(stood, machines, now, config)
-    stood, tipping = tip_overs(stood, stability, machines, driven, now, config)
+    stood, stability = standing(stood, machines, now, config, climbing)
+    stood, tipping = tip_overs(stood, stability, machines, driven, now, config, climbing)
     concerns += tipping
+    concerns += tuple(
+        surmounting.surmounting_concern(
+            name,
+            given,
+            machines[name],
+            stability[name],
+            site_of(name, gauge, config),
+            now,
+            config,
+            name in driven,
+        )
+        for name, given in climbing.items()
+        if name in config.own
+    )
     concerns += tuple(unknown_ages(driven, machines, now, config))
     raised = alarms.update(state.alarms, concerns, now)
     health = _health(state.health, inputs, strangers)
@@ -134,6 +150,7 @@ def step(state: State, inputs: Inputs, now: float, config: Config) -> tuple[Stat
         gauge=gauge,
         people=people,
         stability=stability,
+        surmounting=climbing,
     )
     following = replace(
         state,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from backend.machine.model import Machine
-from backend.safety import people_words, site, tip_over
+from backend.safety import people_words, site, surmounting, tip_over
 from backend.safety.partner import part
 from backend.safety.record import Concern, Level
 
@@ -43,7 +43,7 @@ def line(concern: Concern, labels: dict[str, str]) -> str:
         return _fit(people_words.line(concern.level.name, own, evidence))
     other_machine, _, _ = evidence.other.partition(":")
     other = f"{labels.get(other_machine, other_machine.upper())} {part(evidence.other)}"
-    if concern.name == site.NAME:
+    if concern.name in (site.NAME, surmounting.NAME):
         other = part(evidence.other)
     value = f"{max(evidence.distance, 0.0):.2f} m"
     return _fit(f"{concern.level.name} · {own} {part(evidence.own)} ↔ {other} · {value}")
@@ -54,6 +54,8 @@ def detail(concern: Concern, machine: Machine, labels: dict[str, str]) -> str:
     own = labels.get(concern.machine, concern.machine.upper())
     if concern.name == people_words.NAME:
         return people_words.detail(concern, own, tuple(directions(machine).values()))
+    if concern.name == surmounting.NAME and concern.evidence is None:
+        return surmounting.detail(concern.level, own)
     if concern.level is Level.UNKNOWN and concern.name == tip_over.NAME:
         return f"The site asks for it: do not move {own}. State its masses, measure its slope."
     if concern.level is Level.UNKNOWN:

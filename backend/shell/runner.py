@@ -11,7 +11,7 @@ import math
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from typing import Protocol
 
@@ -19,6 +19,7 @@ from backend.pipeline.config import Config
 from backend.pipeline.people_records import Seen
 from backend.pipeline.records import ImageStamp, Inputs, Notice, Snapshot
 from backend.pipeline.step import initial, step
+from backend.safety.surmounting import Surmounting
 from backend.shell.hub import Hub
 from backend.shell.image_loops import ImageLoop, ImageLoops, Stopwatch, ticks
 from backend.shell.kinds import Wishes
@@ -43,7 +44,8 @@ class Runner:
     notices: what operators should know about the cockpit itself, asked each cycle; after_cycle:
     told a cycle's inputs and conclusions once every view has them; driven: which machines somebody
     controls from here; gauge: what operators chose of it, the same object until it changes; people:
-    what LiDARs saw since it was last asked. All must be quick.
+    what LiDARs saw since it was last asked; surmounting: what machines climb by plan. All must be
+    quick.
     """
 
     def __init__(
@@ -60,6 +62,7 @@ class Runner:
         driven: Callable[[], tuple[str, ...]] = lambda: (),
         gauge: Callable[[], GaugeChoice] = lambda: NO_CHOICE,
         people: Callable[[], Seen | None] = lambda: None,
+        surmounting: Callable[[], Mapping[str, Surmounting]] = dict,
     ) -> None:
         self.config = config
         self.hub = hub
@@ -72,6 +75,7 @@ class Runner:
         self._driven = driven
         self._gauge = gauge
         self._people = people
+        self._surmounting = surmounting
         self._told: tuple[GaugeChoice, float] = (NO_CHOICE, -math.inf)
         self._done: deque[ImageStamp] = deque(maxlen=100)
         self._images = ImageLoops(hub, loops, wishes, self._done.append, clock)
@@ -120,8 +124,9 @@ class Runner:
             inputs = self._source.take()
             finished = tuple(self._done.popleft() for _ in range(len(self._done)))
             notices, driven, chosen = self._notices(), self._driven(), self._chosen(start)
-            people = self._people()
-            if finished or notices or driven or chosen is not None or people is not None:
+            people, climbing = self._people(), self._surmounting()
+            known = chosen is not None or people is not None
+            if finished or notices or driven or climbing or known:
                 inputs = replace(
                     inputs,
                     images=inputs.images + finished,
@@ -129,6 +134,7 @@ class Runner:
                     driven=driven,
                     gauge=chosen,
                     people=people,
+                    surmounting=climbing,
                 )
             state, snapshot = step(state, inputs, start, self.config)
             self.step_timing.add(start, self._clock())

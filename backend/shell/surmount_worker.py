@@ -14,6 +14,7 @@ from backend.documents.surmount_document import SurmountDocument, SurmountParame
 from backend.documents.surmount_live import LiveSurmount, blocked, nearest_now
 from backend.documents.surmount_side import base_poses, side_view
 from backend.machine.model import Machine
+from backend.shell.surmount_follow import trajectory_of
 from backend.spatial.boxes import Boxes
 from backend.spatial.types import Array
 
@@ -123,6 +124,6 @@ def _searched(
     q = np.array(document.joints)
     near = nearest_now(machine, live.q, live.T_site_root, live.boxes, live.names, live.keep)
     look = Look(live.machine, q, base, live.boxes, live.names, live.keep, near)
-    made = Trajectory(np.array(document.time), q, np.array(document.joint_velocities))
+    made = trajectory_of(machine, live, document)
     side, hit = side_view(machine, document), in_the_way(machine, look)
     return Answer(document, made, base, near, side, hit, time.monotonic() - began)

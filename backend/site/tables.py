@@ -122,7 +122,8 @@ class MachineSim(Table):
     """What a simulated machine does; `details` are the program's own fields.
 
     joints: what it publishes of the joints that cylinders move: "angles", or the cylinders'
-    "strokes", as a machine with stroke sensors does.
+    "strokes", as a machine with stroke sensors does. ground: "plane", on which its base is carried
+    by its tracks and tips, or "contact", on which it stands, climbs the site's obstacles and falls.
     """
 
     model_config = ConfigDict(extra="allow")
@@ -130,6 +131,7 @@ class MachineSim(Table):
     program: str = "hold"
     seed: Annotated[int, Field(ge=0)] = 0
     joints: Literal["angles", "strokes"] = "angles"
+    ground: Literal["plane", "contact"] = "plane"
 
     @property
     def details(self) -> dict[str, Any]:

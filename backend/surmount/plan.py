@@ -50,10 +50,11 @@ class Refusal:
 
 @dataclass(frozen=True, eq=False)
 class LegPlan:
-    """leg; made: as it is gone up; found: the chosen parameters; candidates: with others, the best
-    first; by: how they were looked for; simulations: halves.
+    """climber: as it goes up; leg; made: as it is gone up; found: the chosen parameters;
+    candidates: these and others, the best first; simulations: halves that were simulated.
     """
 
+    climber: Climber
     leg: Leg
     made: Manoeuvre
     found: Found
@@ -105,19 +106,21 @@ def plan(
     given: Parameters | None = None,
     spline: bool = False,
     p4: float | None = None,
+    depth: float = math.inf,
     told: Told = lambda done, of, words: True,
 ) -> Plan | Refusal:
     """From P_b at x [m] before the first edge (negative), arm in q (n,), over all edges.
 
     given: parameters of the only edge, instead of a search; spline: whether sequence 1 may rise by
-    a spline where that needs less; p4: else the least at which it stands.
+    a spline where that needs less; p4: else the least at which it stands; depth: of the level
+    ground behind the last edge [m].
     """
     ahead = climber(machine, demands)
     dt = options_of(ahead).step
     parts: list[Motion] = []
     plans: list[LegPlan] = []
     place, posture, ground = x, np.array(q, dtype=float), 0.0
-    for number, leg in enumerate(legs(edges)):
+    for number, leg in enumerate(legs(edges, depth)):
         which = "" if len(edges) == 1 else f"edge {number + 1}: "
         up = climber(machine, replace(demands, facing=-demands.facing)) if leg.down else ahead
         made = _leg(up, leg, posture, dt, opened, effort, given, spline, p4, told)
@@ -216,7 +219,7 @@ def _leg(
             if made.motion is not None:
                 others = tuple(one for one in candidates if one is not found)
                 return LegPlan(
-                    leg, made, found, (found, *others[: OFFERED - 1]), search.simulations
+                    up, leg, made, found, (found, *others[: OFFERED - 1]), search.simulations
                 )
             last = made
     assert last is not None

@@ -38,6 +38,8 @@ STARTS = 3
 DEAR = 3.0
 """What does not hold costs this many times the best that does, and more."""
 ROWS = 31
+SPARE = 0.15
+"""Of clearance and margin, that a search keeps beyond what is demanded."""
 
 
 class Job(NamedTuple):
@@ -101,10 +103,19 @@ class Search:
     simulations: int = 0
     own: Sweep | None = None
     refusals: dict[str, tuple[int, Verdict]] = field(default_factory=dict)
+    strict: Climber = field(init=False)
 
     def __post_init__(self) -> None:
         if self.own is None:
             self.own = own_bodies(self.climber)
+        # Between the rows of a search a little more is lost than between those of the last look.
+        demands = self.climber.demands
+        more = replace(
+            demands,
+            clearance=demands.clearance + SPARE * demands.clearance,
+            margin=demands.margin + SPARE * demands.margin,
+        )
+        self.strict = replace(self.climber, demands=more)
 
     @property
     def boom(self) -> float:
@@ -131,7 +142,7 @@ class Search:
     def verdict(self, half: Half, parameters: Parameters, spline: Spline | None = None) -> Verdict:
         """What holds of one half."""
         return judge(
-            self.climber, self.step, parameters, spline, ROWS, self.own, HALVES[half], quick=True
+            self.strict, self.step, parameters, spline, ROWS, self.own, HALVES[half], quick=True
         )[0]
 
     def energies(self, jobs: Sequence[Job], words: str = "") -> list[float]:
@@ -261,7 +272,7 @@ class Search:
 
         def left(x: Array) -> Array:
             made = [
-                judge(self.climber, self.step, at(x), None, ROWS, self.own, names)[0].values
+                judge(self.strict, self.step, at(x), None, ROWS, self.own, names)[0].values
                 for names in HALVES.values()
             ]
             return np.asarray(np.clip(np.concatenate(made), -10.0, 10.0))

@@ -52,7 +52,7 @@ def reach(config: Config, gap: float) -> float:
 def snapshot(config: Config, gap: float, time: float = 1.0, **partner: Any) -> Any:
     right = state(config, "right", reach(config, gap), **partner)
     machines = {"left": state(config, "left", 0.0), "right": right}
-    return SimpleNamespace(time=time, machines=machines, gauge=AS_THE_SITE_SAYS)
+    return SimpleNamespace(time=time, machines=machines, gauge=AS_THE_SITE_SAYS, surmounting={})
 
 
 def out(config: Config) -> Wish:
@@ -96,7 +96,8 @@ def test_the_site_counts_by_its_full_name() -> None:
     )
     far = state(made, "support", 200.0)
     gauge = GaugeInForce(own_tracks={"rail": ("T1",)})
-    now = SimpleNamespace(time=1.0, gauge=gauge, machines={"rail": rail, "support": far})
+    machines = {"rail": rail, "support": far}
+    now = SimpleNamespace(time=1.0, gauge=gauge, machines=machines, surmounting={})
     wish = Wish(np.eye(6)[0] * -machine.max_velocity, np.zeros(2))  # to T2, at the right
     shaped, told = Methods(made).shape("rail", Method.CONSTRAINED, wish, now, False)
     assert abs(shaped.joints[0]) < machine.max_velocity[0]

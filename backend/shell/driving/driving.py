@@ -24,6 +24,7 @@ from backend.machine.model import Machine
 from backend.pipeline.records import Snapshot
 from backend.safety.limiter import Decision, Latch, limit, open_latch
 from backend.safety.limits import Delay
+from backend.safety.surmounting import Surmounting
 from backend.shell.driving import pages
 from backend.shell.driving.document import machine_document, seat_document
 from backend.shell.driving.follows import Followed, Follows, NoPlans, Plans
@@ -145,6 +146,11 @@ class Driving:
         current = lease is not None and found is not None and found.token == lease.token
         return found if current else None
 
+    def surmounting(self) -> dict[str, Surmounting]:
+        """By machine what it climbs by plan, for the next cycle of the pipeline."""
+        with self._lock:
+            return self._follows.surmounting(self._clock())
+
     def cycle(self, snapshot: Snapshot) -> None:
         """Sends what the newest snapshot allows of what the operators wish."""
         for name, status in self._statuses().items():
@@ -165,6 +171,7 @@ class Driving:
                 for machine in _reset(seat, after):
                     self._stopped.pop(machine, None)
             present = dict(self._seats)
+            self._follows.forget({m: (lease.seat, lease.token) for m, lease in held.items()})
         decisions = {
             machine: self._drive(machine, present[lease.seat], lease, snapshot, now)
             for machine, lease in held.items()
@@ -257,7 +264,7 @@ class Driving:
             decision = replace(decision, locked=link.locked)
         if followed is not None:
             with self._lock:
-                self._follows.allowed(name, decision.joints)
+                self._follows.allowed(name, decision.joints, decision.tracks)
         self._fencing[name] = _Fencing(lease.token, decision.latch)
         outlet.send(decision, lease.who, lease.token)
         return decision, told

@@ -3,20 +3,25 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
 
 from backend.control import follow as rules
+from backend.control.climb import Climb
 from backend.control.console import State
 from backend.control.follow import Follow, Trajectory
 from backend.control.seat import Seat
+from backend.fusion.pose import Validity
 from backend.machine.model import Machine
 from backend.pipeline.braking import age_of
 from backend.pipeline.records import Snapshot
 from backend.safety.limiter import Wish
 from backend.safety.limits import Delay
+from backend.safety.surmounting import Surmounting
+from backend.spatial.rotation import to_attitude
 from backend.spatial.types import Array
 
 MOST_LAG = 0.6
@@ -122,6 +127,9 @@ class Follows:
         lag = float(delay.total(n, age_of(state, snapshot.time))[0]) - 0.5 * delay.up
         lag = min(lag, MOST_LAG) if math.isfinite(lag) else MOST_LAG
         dt = now - found.cycled
+        body, path = None, found.follow.trajectory
+        if path.base is not None and state.pose.validity is Validity.VALID:
+            body = state.body
         following, rates = rules.advance(
             found.follow,
             state.pose.joints,
@@ -129,16 +137,39 @@ class Follows:
             console.state is State.ENABLED,
             dt if dt > 0.0 else 0.0,
             np.array([joint.continuous for joint in machine.joints]),
+            None if body is None else body.link_poses[0],
+            delay.track_lag - delay.joint_lag,
+            rules.stands_within(path, delay.track_lag, machine.tracks.max_acceleration),
         )
         self._by_machine[name] = replace(found, follow=following, cycled=now)
-        full = machine.max_velocity
-        return Wish(np.clip(rates, -full, full), np.zeros(2))
+        full, fast = machine.max_velocity, machine.tracks.max_speed
+        return Wish(np.clip(rates, -full, full), np.clip(following.tracks, -fast, fast))
 
-    def allowed(self, name: str, sent: Array) -> None:
-        """What the limiter left of the wish of this cycle: (n,) [rad/s]."""
+    def allowed(self, name: str, sent: Array, tracks: Array) -> None:
+        """What the limiter left of the wish of this cycle: (n,) [rad/s] and (2,) [m/s]."""
         found = self._by_machine.get(name)
         if found is not None:
-            self._by_machine[name] = replace(found, follow=rules.allowed(found.follow, sent))
+            following = rules.allowed(found.follow, sent, tracks)
+            self._by_machine[name] = replace(found, follow=following)
+
+    def surmounting(self, now: float) -> dict[str, Surmounting]:
+        """By machine what is climbed by plan, moving or not, until it is over; told at now [s]."""
+        found = {}
+        for machine, one in self._by_machine.items():
+            climb = one.follow.trajectory.climb
+            if climb is not None and not one.follow.ended:
+                found[machine] = _surmounting(one, climb, now)
+        return found
+
+    def forget(self, held: Mapping[str, tuple[str, int]]) -> None:
+        """What is climbed under a lease that is another's now is over. held: the seat and the token
+        of each machine's lease.
+        """
+        for machine, one in self._by_machine.items():
+            climbs = one.follow.trajectory.climb is not None and not one.follow.ended
+            if climbs and held.get(machine) != (one.seat, one.token):
+                over = replace(one.follow, ended="the machine was given back")
+                self._by_machine[machine] = replace(one, follow=over)
 
     def ended(self) -> list[tuple[str, Followed]]:
         """What ended since it was asked last, each once."""
@@ -146,3 +177,28 @@ class Follows:
         for machine, one in found:
             self._by_machine[machine] = replace(one, told=True)
         return found
+
+
+def _surmounting(followed: Followed, climb: Climb, now: float) -> Surmounting:
+    """As it should be seen now, and what it stands on then."""
+    follow = followed.follow
+    path, at = follow.trajectory, follow.seen
+    base = path.base_at(at)
+    assert base is not None
+    yaw, pitch, roll = (float(angle) for angle in to_attitude(base[:3, :3]))
+    k = min(int(np.searchsorted(path.times, at)), len(path.times) - 1)
+    points = climb.support[k][np.isfinite(climb.support[k]).all(axis=1)]
+    x, y, z = base[:3, 3].tolist()
+    return Surmounting(
+        plan=followed.plan,
+        time=now,
+        obstacles=climb.obstacles,
+        phase=climb.phase_at(at),
+        touching=climb.touching,
+        position=(x, y, z),
+        attitude=(yaw, pitch, roll),
+        tolerance=path.tolerance,
+        support=tuple((float(a), float(b), float(c)) for a, b, c in points),
+        margin=float(climb.margin[k]),
+        clearance=climb.clearance,
+    )

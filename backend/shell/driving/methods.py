@@ -13,6 +13,7 @@ from backend.fusion.pose import Validity
 from backend.machine.model import Machine
 from backend.pipeline.config import Config
 from backend.pipeline.records import MachineState, Snapshot
+from backend.pipeline.surmounting import without
 from backend.pipeline.working_gauge import site_of
 from backend.planning import live
 from backend.planning.live import Around
@@ -89,7 +90,7 @@ class Methods:
             return Around(q, np.zeros((0, 4, 4)), nothing, np.zeros(0), unknown)
         # As `site_concern` and `proximity`: beyond the configured part, each pose's inflation.
         doubt = own.eta - config.eta
-        site = site_of(name, snapshot.gauge, config)
+        site = without(site_of(name, snapshot.gauge, config), snapshot.surmounting.get(name))
         boxes, names = [site.boxes], _features(ByIdentity(site))
         doubts = [np.full(len(names), doubt)]
         for partner, state in states.items():

@@ -22,6 +22,7 @@ from backend.shell.session.format import CLOCK, CYCLE, GAUGE, OWN, PEOPLE, Messa
 from backend.shell.session.mapping import map_topics
 from backend.shell.session.people_message import seen_of
 from backend.shell.session.reader import Session
+from backend.shell.session.surmounting_message import surmounting_of
 from backend.site.gauge_choice import GaugeChoice, checked, from_document
 from backend.site.site import Site
 
@@ -227,12 +228,13 @@ def _recorded(reader: _Reader, messages: Iterator[Message]) -> Iterator[Portion]
             cycle = document(message.data)
             own = float(cycle["time"])
             number = int(cycle["cycle"])
-            inputs = _inputs(tuple(heard), cycle, chosen, people)
-        except (ValueError, TypeError, KeyError):
+            local = reader.local(message.time)
+            moved = local - own if abs(own - local) > SET else 0.0
+            inputs = _inputs(tuple(heard), cycle, chosen, people, moved)
+        except (ValueError, TypeError, KeyError, AttributeError):
             reader.session.note("a cycle's message cannot be read; its portion joins the next")
             continue
-        local = reader.local(message.time)
-        newest = max(newest, own if abs(own - local) <= SET else local)
+        newest = max(newest, local if moved else own)
         heard, chosen, people = [], None, None
         yield Portion(newest, message.time, inputs, number)
 
@@ -242,7 +244,9 @@ def _inputs(
     cycle: dict[str, Any],
     chosen: GaugeChoice | None,
     people: Seen | None,
+    moved: float,
 ) -> Inputs:
+    """moved: later on the time line than by the cycle's own times [s]."""
     return Inputs(
         samples=heard,
         images=tuple(ImageStamp(**image) for image in cycle.get("images", ())),
@@ -253,6 +257,10 @@ def _inputs(
         driven=tuple(str(name) for name in cycle.get("driven", ())),
         gauge=chosen,
         people=people,
+        surmounting={
+            str(name): surmounting_of(one, moved)
+            for name, one in cycle.get("surmounting", {}).items()
+        },
     )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import fields, replace
 from itertools import count
+from typing import Any
 
 from backend.pipeline.config import Config
 from backend.pipeline.records import Inputs, Snapshot
@@ -56,13 +57,13 @@ class Evaluator:
 def merged(inputs: Iterable[Inputs]) -> Inputs:
     """Inputs of consecutive cycles as those of one, in order."""
     several = list(inputs)
-    joined = {
+    joined: dict[str, Any] = {
         field.name: sum((getattr(one, field.name) for one in several), start=())
         for field in fields(Inputs)
-        if field.name not in ("lost", "notices", "driven", "gauge", "people")
+        if field.name not in ("lost", "notices", "driven", "gauge", "people", "surmounting")
     }
-    # Notices, and who is driven, are not events: those of the last cycle hold; and of the gauge
-    # what was chosen last, and the newest of what LiDARs saw.
+    # Notices, and who is driven or climbs, are no events: those of the last cycle hold; of the
+    # gauge what was chosen last, and the newest of what LiDARs saw.
     people = next((one.people for one in reversed(several) if one.people is not None), None)
     chosen = next((one.gauge for one in reversed(several) if one.gauge is not None), None)
     lost = sum(one.lost for one in several)

@@ -53,7 +53,7 @@ def _object(title: str, required: dict[str, Any], optional: dict[str, Any]) -> d
 
 
 SCHEMAS: dict[str, dict[str, Any]] = {
-    # time: of the cycle; counts as in pipeline.records.Inputs
+    # time: of the cycle; counts as in pipeline.records.Inputs; surmounting: by machine
     CYCLE: _object(
         "Cycle",
         {"cycle": _COUNT, "time": _NUMBER},
@@ -64,6 +64,7 @@ SCHEMAS: dict[str, dict[str, Any]] = {
             "lost": _COUNT,
             "notices": {"type": "array", "items": {"type": "object"}},
             "driven": {"type": "array", "items": {"type": "string"}},
+            "surmounting": {"type": "object"},
         },
     ),
     # one round trip to a machine's clock: local, remote, local [s]

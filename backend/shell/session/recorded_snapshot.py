@@ -37,6 +37,7 @@ from backend.pipeline.records import (
 from backend.safety.alarms import Alarm
 from backend.safety.record import Concern, Evidence, Level
 from backend.shell.session.recorded_people import recorded_people
+from backend.shell.session.surmounting_message import surmounting_of
 from backend.site.gauge_choice import NO_CHOICE, GaugeChoice
 from backend.spatial.types import Array
 
@@ -109,6 +110,11 @@ def _snapshot(document: Document, config: Config) -> Snapshot:
         stability={
             name: read_stability(one)
             for name, one in document.get("stability", {}).items()
+            if name in known
+        },
+        surmounting={
+            name: surmounting_of(one)
+            for name, one in document.get("surmounting", {}).items()
             if name in known
         },
         people=recorded_people(document.get("people"), float(document["time"]), config),

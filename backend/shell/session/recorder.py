@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
@@ -239,6 +239,8 @@ def _cycle_text(inputs: Inputs, snapshot: Snapshot) -> bytes:
         document["lost"] = inputs.lost
     if inputs.driven:
         document["driven"] = list(inputs.driven)
+    if inputs.surmounting:
+        document["surmounting"] = {name: asdict(one) for name, one in inputs.surmounting.items()}
     if inputs.notices:
         document["notices"] = [{"key": n.key, "line": n.line} for n in inputs.notices]
     return msgspec.json.encode(document)  # numbers come back bit by bit, and it is quick

@@ -165,7 +165,14 @@ def _loop(
     status_due = truth_due = t
     attitude = start.attitude if start else (0.0, 0.0, 0.0)
     state = on_schedule(program, t - start_at, position, *attitude)
-    stance, lean = stance_of(machine, site.machine(name).payload or 0.0), UPRIGHT
+    carried = site.machine(name).payload or 0.0
+    grounded = None
+    if site.machine(name).sim.ground == "contact":
+        # MuJoCo is loaded only where something stands on real ground.
+        from backend.shell.sim.grounded import Grounded
+
+        grounded = Grounded(machine, carried, site.obstacle_boxes(), state, dt)
+    stance, lean = stance_of(machine, carried) if grounded is None else None, UPRIGHT
     shown, judged, judged_at = state, state, t
     while not until.is_set():
         now = time.monotonic() + epoch
@@ -179,6 +186,9 @@ def _loop(
             t += dt
             agent, before, demand = act(agent, program, hydraulics, state, t - start_at, dt)
             state = shown = step(before, demand, limits, hydraulics, dt)
+            if grounded is not None:
+                state = grounded.relieved(state)
+                shown = grounded.step(state)
             if stance is not None:
                 if t >= judged_at + TIP_PERIOD - 1e-6:
                     lean = tip(lean, judged, state, stance, t - judged_at)
@@ -198,7 +208,8 @@ def _loop(
                     wire.on_air = send(wire.on_air, t, message, wire.radio)
                     due[i] = max(due[i] + sensor.period, t - sensor.period)
             if t >= status_due - 1e-6:
-                mode = TIPPING if lean.angle > TOLD else agent.mode.value
+                tips = lean.angle > TOLD or (grounded is not None and grounded.over)
+                mode = TIPPING if tips else agent.mode.value
                 report = status_of(agent.gate, name, mode, t + skew, t - start_at)
                 status = encode_status(report)
                 wire.on_air = send(wire.on_air, t, ("status", status), wire.radio)
