@@ -107,22 +107,32 @@ function lines(g, width, height, kind) {
   };
 }
 
+/** (19): of the sequences alone, from the energy of everything. */
+function ofSequences({ energy: all, phase }, phases) {
+  let sum = 0;
+  return all.map((v, k) => {
+    if (k && /sequence/.test(phases[phase[k]]?.name ?? "")) sum += v - all[k - 1];
+    return sum;
+  });
+}
+
 function energy(g, width, height) {
   const document = model.document(), figures = document?.figures;
   if (!figures?.time.length) return nothing(g, width, height, "energy");
   clear(g, width, height);
-  const { energy_potential: least, energy_quasi_static: slow } = document;
-  const bounds = [[least, "m g h", [2, 3]], [slow, "quasi-static", [7, 4]]].filter(([v]) => Number.isFinite(v));
-  const most = Math.max(...finite(figures.energy), ...bounds.map(([v]) => v), 1e-6);
-  const big = most >= 2000, k = big ? 1e-3 : 1, unit = big ? "kJ" : "J";
-  const list = [[swatches.line("#FFFFFF"), `|τ Δθ| ${number(k * Math.max(...finite(figures.energy)), big ? 2 : 1)} ${unit}`], ...bounds.map(([v, name, dash]) => [swatches.line(C.tipOver, dash, 2), `${name} ${number(k * v, big ? 2 : 1)}`])];
+  const { energy_potential: least, energy_quasi_static: slow } = document, mine = ofSequences(figures, document.phases);
+  const bounds = [[least, "heights", [2, 3]], [slow, "slowly", [7, 4]]].filter(([v]) => Number.isFinite(v));
+  const most = Math.max(...finite(figures.energy), ...bounds.map(([v]) => v), 1e-6), total = mine[mine.length - 1];
+  const big = most >= 2000, k = big ? 1e-3 : 1, unit = big ? "kJ" : "J", told_ = (v) => number(k * v, big ? 2 : 1);
+  const list = [[swatches.line("#FFFFFF"), `sequences ${told_(total)}`], [swatches.line(C.second, [2, 3], 1.5), "with moves"], ...bounds.map(([v, name, dash]) => [swatches.line(C.tipOver, dash, 2), `${name} ${told_(v)}`])];
   const legends = entries(g, width, height, list);
-  const chart = (charts.energy = overTime(g, width, height, legends, upward(0, k * most, height < 150 ? 3 : 5), `energy, ${unit}`, unit, document.duration, 2.8));
+  const chart = (charts.energy = overTime(g, width, height, legends, upward(0, k * most, height < 150 ? 3 : 5), `energy ∑|τ Δθ|, ${unit}`, unit, document.duration, 2.4));
   bands(g, chart, document.phases);
   for (const [v, , dash] of bounds) segment(g, chart.box.left, chart.y(k * v), chart.box.right, chart.y(k * v), C.tipOver, 2, dash);
-  curve(g, chart, points(chart, figures.time, figures.energy.map((v) => k * v)), "#FFFFFF", 2);
+  curve(g, chart, points(chart, figures.time, figures.energy.map((v) => k * v)), C.second, 1.5, [2, 3]);
+  curve(g, chart, points(chart, figures.time, mine.map((v) => k * v)), "#FFFFFF", 2);
   needle(g, chart, model.moment());
-  return { state: told("energy", { total: rounded(figures.energy[figures.energy.length - 1]), bounds: bounds.map(([, name]) => name) }), age: 0, label: `Energy over time: ${number(k * most, 2)} ${unit} in all` };
+  return { state: told("energy", { total: rounded(total), whole: rounded(figures.energy[figures.energy.length - 1]), bounds: bounds.map(([, name]) => name) }), age: 0, label: `Energy over time: ${told_(total)} ${unit} in the sequences, ${told_(most)} ${unit} in all` };
 }
 
 /** Fig. 14: the way of the centre of mass, over the ground. */
@@ -166,7 +176,7 @@ function probing(which) {
     const t = timeAt(chart, px, py);
     if (t === null) return null;
     const head = [`${number(t, 1)} s · ${model.phase(t)?.name ?? ""}`];
-    if (kind === "energy") return [...head, `${number(at(figures.time, figures.energy, t), 1)} J so far`];
+    if (kind === "energy") return [...head, `sequences ${number(at(figures.time, ofSequences(figures, document.phases), t), 1)} J`, `with moves ${number(at(figures.time, figures.energy, t), 1)} J so far`];
     const { unit, rows, of, digits, limit: sized } = written(kind, figures), row = at(figures.time, rows(figures), t);
     const limit = (j) => (kind === "torques" && Number.isFinite(figures.torque_limits[j]) ? ` of ${number(sized(figures.torque_limits[j]), digits)}` : "");
     return [...head, ...document.roles.map((role, j) => `${role} ${number(of(row[j]), digits)}${limit(j)} ${unit}`)];
