@@ -442,12 +442,8 @@ class SurmountDesk:
 
 def _one_of(whole: SurmountDocument, k: int, made: SurmountDocument) -> SurmountDocument:
     """What was made of candidate k, with all candidates beside it."""
-    worst = None if made.checks is None else made.checks.worst_torque
-    margin = None if made.checks is None else made.checks.min_stability_margin
-    known = {"energy": made.energy, "duration": made.duration, "simulated": True}
-    known |= {"worst_torque": worst, "min_stability_margin": margin}
-    candidates = [
-        one.model_copy(update={"chosen": i == k, **(known if i == k and made.ok else {})})
-        for i, one in enumerate(whole.candidates)
-    ]
+    candidates = [one.model_copy(update={"chosen": i == k}) for i, one in enumerate(whole.candidates)]
+    if made.ok and not candidates[k].simulated:
+        known = {"energy": made.energy, "simulated": True}
+        candidates[k] = candidates[k].model_copy(update=known)
     return made.model_copy(update={"candidates": candidates})

@@ -283,8 +283,11 @@ def test_another_candidate_has_another_name_and_the_same_table(live: Live) -> No
     assert document.candidates[3].simulated
     assert document.candidates[0].energy == ENERGIES[0]
     assert "not on offer" in str(live.desk.offered("a", first["plan"]))
+    assert found["energy"] == 4444.0
     live.desk.choose("a", found["plan"], SurmountChoice(candidate=0), "bob")
     assert live.until("offered")["plan"] == f"{first['plan']}.0"
+    document = SurmountDocument.model_validate_json(live.desk.text("a", f"{first['plan']}.0"))
+    assert document.candidates[0].energy == ENERGIES[0]  # had been simulated
 
 
 def test_the_search_tells_how_far_it_is_and_is_cancelled(live: Live) -> None:

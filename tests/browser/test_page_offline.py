@@ -31,7 +31,7 @@ def frame(header: dict[str, Any], arrays: dict[str, np.ndarray] | None = None) -
     return head + bytes(-len(head) % 8) + payload
 
 
-def site() -> bytes:
+def site(**changes: Any) -> bytes:
     joints = [
         {"role": "swing", "lower": None, "upper": None, "continuous": True, "max_velocity": 0.9}
     ]
@@ -54,6 +54,7 @@ def site() -> bytes:
                 "right": {**machine, "label": "RIGHT"},
             },
             "obstacles": [],
+            **changes,
         }
     )
 

@@ -37,8 +37,8 @@ export function frame(g, { left, right, height }, across, up, title, unit, width
 
 /** Round ticks of at most `most` from low to high, and the ends moved out to them. */
 export function upward(low, high, most) {
-  const steps = [0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, 200];
-  const step = steps.find((s) => (high - low) / s <= most) ?? 500;
+  const steps = [0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000];
+  const step = steps.find((s) => (high - low) / s <= most) ?? 10000;
   const from = Math.floor(low / step + 1e-6) * step, to = Math.max(from + step, Math.ceil(high / step - 1e-6) * step);
   return { from, to, marks: ticks(from, to, most + 2, [step]).map((v) => [v, number(v, step < 0.1 ? 2 : step < 1 ? 1 : 0)]) };
 }

@@ -115,6 +115,8 @@ async function fetchIt({ plan: name }) {
   try {
     const found = await get(path(state.own, name));
     const around = found.ok ? await get(path(state.own, name, "side")) : null;
+    // Told from the edge, drawn from where the tracks' middle was first, as in Fig. 14.
+    for (const point of found.figures?.com ?? []) point[0] += found.obstacle?.distance ?? 0;
     fetched = { plan: name, document: found, side: around };
     if (found.ok) preview.begin(name);
   } catch {

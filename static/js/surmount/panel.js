@@ -14,7 +14,7 @@ import { startSide } from "./side.js";
 const FIELDS = { height: [0.3, -5, 5], distance: [2, 0.1, 100], payload: [0, 0, 1e6] };
 const NUMBERS = ""; // the value of the choice "by numbers"
 const MOST = 12; // candidates in the table
-const KINDS = { reach: "Out of the arm's reach", torque: "Too little torque", stability: "It would tip", collision: "It would collide", simulation: "Not in the simulation" };
+const KINDS = { room: "Too little room", reach: "Out of the arm's reach", torque: "Too little torque", stability: "It would tip", collision: "It would collide", simulation: "Not in the simulation" };
 
 let open = false;
 let redraw = () => {};
@@ -83,6 +83,7 @@ function lines() {
     const [where, what] = followLines(follow);
     return [`${model.phase(follow.at)?.name ?? ""} · ${where}`, what];
   }
+  if (follow?.ended && !follow.arrived && follow.plan === offer?.plan) return [`Ended: ${named(follow.ended)}`];
   if (offer?.progress) return [offer.progress.of ? `${offer.progress.words} ${offer.progress.done} of ${offer.progress.of}` : offer.progress.words || "starting", "Nothing moves by it"];
   if (model.planning()) return ["waits for its turn", "Nothing moves by it"];
   const step = chosen();

@@ -52,8 +52,16 @@ const told = (kind, more) => ({ kind, plan: model.offer()?.plan ?? null, time: r
 const LINES = {
   joints: { title: "joint angles, °", unit: "°", digits: 1, rows: (f) => f.joints, of: deg },
   rates: { title: "joint rates, °/s", unit: "°/s", digits: 1, rows: (f) => f.rates, of: deg },
-  torques: { title: "torques |τ|, N m", unit: "N m", digits: 0, rows: (f) => f.torques, of: Math.abs },
+  torques: { title: "torques |τ|, N m", unit: "N m", digits: 1, rows: (f) => f.torques, of: Math.abs },
 };
+const LARGE = 2000; // N m, from which on it is kN m
+
+/** How a kind is written: large torques in kN m. */
+function written(kind, figures) {
+  const line = LINES[kind];
+  if (kind !== "torques" || Math.max(...figures.torques.flat().map(Math.abs)) < LARGE) return { ...line, limit: (v) => v };
+  return { ...line, title: "torques |τ|, kN m", unit: "kN m", of: (v) => Math.abs(v) / 1000, limit: (v) => v / 1000 };
+}
 
 /** What the sensors saw of a joint, in the turns of the plan; none of rates and torques. */
 function measured(kind, j, planned) {
@@ -67,11 +75,11 @@ function lines(g, width, height, kind) {
   const document = model.document(), figures = document?.figures;
   if (!figures?.time.length) return nothing(g, width, height, kind);
   clear(g, width, height);
-  const { title, unit, rows, of } = LINES[kind], { roles } = document;
+  const { title, unit, rows, of, limit: sized } = written(kind, figures), { roles } = document;
   const curves = roles.map((_, j) => column(rows(figures), j, of));
   const actual = model.seen(), was = curves.map((values, j) => measured(kind, j, values));
   // Each joint's limit as far up as matters; the swing turns on its bearing and carries nothing.
-  const limits = kind === "torques" ? roles.map((_, j) => figures.torque_limits[j] ?? NaN) : [];
+  const limits = kind === "torques" ? roles.map((_, j) => sized(figures.torque_limits[j] ?? NaN)) : [];
   const most = Math.max(...finite(curves.flat()), 0);
   const drawn = limits.map((limit) => (limit <= HIGHEST * most ? limit : NaN));
   const all = [...curves.flat(), ...was.flat(), ...drawn].filter(Number.isFinite);
@@ -82,7 +90,7 @@ function lines(g, width, height, kind) {
     ...(was.flat().length ? [[swatches.line(C.remote, null, 3), "actual"]] : []),
   ];
   const legends = entries(g, width, height, list);
-  const chart = (charts[kind] = overTime(g, width, height, legends, upward(Math.min(...all), Math.max(...all), height < 150 ? 3 : 5), title, unit, document.duration, kind === "torques" ? 3.6 : 2.4));
+  const chart = (charts[kind] = overTime(g, width, height, legends, upward(Math.min(...all), Math.max(...all), height < 150 ? 3 : 5), title, unit, document.duration, 2.4));
   bands(g, chart, document.phases);
   drawn.forEach((limit, j) => {
     if (!Number.isFinite(limit)) return;
@@ -99,22 +107,32 @@ function lines(g, width, height, kind) {
   };
 }
 
+/** (19): of the sequences alone, from the energy of everything. */
+function ofSequences({ energy: all, phase }, phases) {
+  let sum = 0;
+  return all.map((v, k) => {
+    if (k && /sequence/.test(phases[phase[k]]?.name ?? "")) sum += v - all[k - 1];
+    return sum;
+  });
+}
+
 function energy(g, width, height) {
   const document = model.document(), figures = document?.figures;
   if (!figures?.time.length) return nothing(g, width, height, "energy");
   clear(g, width, height);
-  const { energy_potential: least, energy_quasi_static: slow } = document;
-  const bounds = [[least, "m g h", [2, 3]], [slow, "quasi-static", [7, 4]]].filter(([v]) => Number.isFinite(v));
-  const most = Math.max(...finite(figures.energy), ...bounds.map(([v]) => v), 1e-6);
-  const big = most >= 2000, k = big ? 1e-3 : 1, unit = big ? "kJ" : "J";
-  const list = [[swatches.line("#FFFFFF"), `|τ Δθ| ${number(k * Math.max(...finite(figures.energy)), big ? 2 : 1)} ${unit}`], ...bounds.map(([v, name, dash]) => [swatches.line(C.tipOver, dash, 2), `${name} ${number(k * v, big ? 2 : 1)}`])];
+  const { energy_potential: least, energy_quasi_static: slow } = document, mine = ofSequences(figures, document.phases);
+  const bounds = [[least, "heights", [2, 3]], [slow, "slowly", [7, 4]]].filter(([v]) => Number.isFinite(v));
+  const most = Math.max(...finite(figures.energy), ...bounds.map(([v]) => v), 1e-6), total = mine[mine.length - 1];
+  const big = most >= 2000, k = big ? 1e-3 : 1, unit = big ? "kJ" : "J", told_ = (v) => number(k * v, big ? 2 : 1);
+  const list = [[swatches.line("#FFFFFF"), `sequences ${told_(total)}`], [swatches.line(C.second, [2, 3], 1.5), "with moves"], ...bounds.map(([v, name, dash]) => [swatches.line(C.tipOver, dash, 2), `${name} ${told_(v)}`])];
   const legends = entries(g, width, height, list);
-  const chart = (charts.energy = overTime(g, width, height, legends, upward(0, k * most, height < 150 ? 3 : 5), `energy, ${unit}`, unit, document.duration, 2.8));
+  const chart = (charts.energy = overTime(g, width, height, legends, upward(0, k * most, height < 150 ? 3 : 5), `energy ∑|τ Δθ|, ${unit}`, unit, document.duration, 2.4));
   bands(g, chart, document.phases);
   for (const [v, , dash] of bounds) segment(g, chart.box.left, chart.y(k * v), chart.box.right, chart.y(k * v), C.tipOver, 2, dash);
-  curve(g, chart, points(chart, figures.time, figures.energy.map((v) => k * v)), "#FFFFFF", 2);
+  curve(g, chart, points(chart, figures.time, figures.energy.map((v) => k * v)), C.second, 1.5, [2, 3]);
+  curve(g, chart, points(chart, figures.time, mine.map((v) => k * v)), "#FFFFFF", 2);
   needle(g, chart, model.moment());
-  return { state: told("energy", { total: rounded(figures.energy[figures.energy.length - 1]), bounds: bounds.map(([, name]) => name) }), age: 0, label: `Energy over time: ${number(k * most, 2)} ${unit} in all` };
+  return { state: told("energy", { total: rounded(total), whole: rounded(figures.energy[figures.energy.length - 1]), bounds: bounds.map(([, name]) => name) }), age: 0, label: `Energy over time: ${told_(total)} ${unit} in the sequences, ${told_(most)} ${unit} in all` };
 }
 
 /** Fig. 14: the way of the centre of mass, over the ground. */
@@ -158,9 +176,9 @@ function probing(which) {
     const t = timeAt(chart, px, py);
     if (t === null) return null;
     const head = [`${number(t, 1)} s · ${model.phase(t)?.name ?? ""}`];
-    if (kind === "energy") return [...head, `${number(at(figures.time, figures.energy, t), 1)} J so far`];
-    const { unit, rows, of, digits } = LINES[kind], row = at(figures.time, rows(figures), t);
-    const limit = (j) => (kind === "torques" && Number.isFinite(figures.torque_limits[j]) ? ` of ${number(figures.torque_limits[j], 0)}` : "");
+    if (kind === "energy") return [...head, `sequences ${number(at(figures.time, ofSequences(figures, document.phases), t), 1)} J`, `with moves ${number(at(figures.time, figures.energy, t), 1)} J so far`];
+    const { unit, rows, of, digits, limit: sized } = written(kind, figures), row = at(figures.time, rows(figures), t);
+    const limit = (j) => (kind === "torques" && Number.isFinite(figures.torque_limits[j]) ? ` of ${number(sized(figures.torque_limits[j]), digits)}` : "");
     return [...head, ...document.roles.map((role, j) => `${role} ${number(of(row[j]), digits)}${limit(j)} ${unit}`)];
   };
 }

@@ -13,6 +13,7 @@ import { rowAt } from "../trajectory/preview.js";
 import * as model from "./model.js";
 
 const PARTS = { tracks: 0.85, upper: 0.3 }; // how opaque; the rest in between
+const rounded = (v) => Math.round(v * 100) / 100;
 let chart = null;
 let wanted = () => null; // the step that the fields say
 
@@ -35,12 +36,31 @@ function present() {
   return { tip, tracks: [[-half, 0], [half, 0], [half, 0.2 * half], [-half, 0.2 * half]] };
 }
 
-/** What all moments need of room: [low, high] along and up [m]. */
-function room(side, step, now) {
-  const points = side ? [...side.outlines.flat(2), ...side.pivots.flat()] : now ? [...now.tracks, now.tip, [0, 2]] : [[-2, 0], [2, 2]];
-  if (step) points.push([step.distance, step.height], [step.distance + 0.5, 0]);
-  const low = [0, 1].map((k) => Math.min(...points.map((p) => p[k])) - 0.15), high = [0, 1].map((k) => Math.max(...points.map((p) => p[k])) + 0.15);
-  return { low, high };
+const spread = (points, k) => [Math.min(...points.map((p) => p[k])), Math.max(...points.map((p) => p[k]))];
+const kept = { side: null, room: null };
+
+/** What the largest of all moments needs: width, low and high [m]. The window goes along with the machine, its scale stays. */
+function room(side) {
+  if (kept.side === side) return kept.room;
+  let width = 0, low = -0.1, high = 1;
+  for (const [k, outlines] of side.outlines.entries()) {
+    const points = [...outlines.flat(), ...side.pivots[k]];
+    const [a, b] = spread(points, 0), [c, d] = spread(points, 1);
+    [width, low, high] = [Math.max(width, b - a), Math.min(low, c), Math.max(high, d)];
+  }
+  Object.assign(kept, { side, room: { width: 1.15 * width, low: low - 0.1, high: high + 0.1 } });
+  return kept.room;
+}
+
+/** The window: {width, low, high, middle} [m], of the moment in row k, or of the machine as it stands before the step. */
+function view(side, k, step, now) {
+  if (side) {
+    const [a, b] = spread([...side.outlines[k].flat(), ...side.pivots[k]], 0);
+    return { ...room(side), middle: (a + b) / 2 };
+  }
+  const points = [...now.tracks, now.tip, ...(step ? [[step.distance + 0.5, step.height]] : [])];
+  const [a, b] = spread(points, 0), [c, d] = spread(points, 1);
+  return { width: 1.1 * (b - a), low: Math.min(c, 0) - 0.2, high: Math.max(d, 1) + 0.2, middle: (a + b) / 2 };
 }
 
 function fill(g, { x, y }, points, colour, width = 1.2) {
@@ -63,18 +83,16 @@ function paint(g, width, tall) {
     return { state: { kind: "side", plan: null }, age: Infinity, label: "Side view: the machine's place is unknown" };
   }
   const t = size("tick");
-  const { low, high } = room(side, step, now);
+  const moment = model.moment(), k = side ? rowAt(side.time, moment) : 0;
+  const { width: wide, low, high, middle } = view(side, k, step, now);
   const bottom = tall - 1.15 * t - 2;
   const inner = { w: width - 4 - 2.2 * t - 4, h: bottom - 2.7 * t - 2 };
   // One scale for both, or a step looks higher than it is.
-  const px = Math.min(inner.w / (high[0] - low[0]), inner.h / (high[1] - low[1]));
-  const half = [inner.w / px / 2, inner.h / px / 2], centre = [(low[0] + high[0]) / 2, low[1] + half[1]];
-  const from = [centre[0] - half[0], low[1]], to = [centre[0] + half[0], low[1] + 2 * half[1]];
-  const marks = (k, most) => ticks(from[k], to[k], most, [0.1, 0.2, 0.5, 1, 2, 5, 10]);
-  const digits = (list) => (list.length > 1 && list[1] - list[0] < 0.99 ? 1 : 0);
-  const axis = (k, most) => {
-    const list = marks(k, most);
-    return { from: from[k], to: to[k], marks: list.map((v) => [v, number(v, digits(list))]) };
+  const px = Math.min(inner.w / wide, inner.h / (high - low));
+  const half = inner.w / px / 2, from = [middle - half, low], to = [middle + half, low + inner.h / px];
+  const axis = (n, most) => {
+    const list = ticks(from[n], to[n], most, [0.1, 0.2, 0.5, 1, 2, 5, 10]);
+    return { from: from[n], to: to[n], marks: list.map((v) => [v, number(v, list.length > 1 && list[1] - list[0] < 0.99 ? 1 : 0)]) };
   };
   chart = frame(g, { left: 2, right: width - 2, height: bottom }, axis(0, Math.max(2, width / (4 * t))), axis(1, 5), "height, m", "m", 2.2);
   const { box, x, y } = chart;
@@ -91,9 +109,8 @@ function paint(g, width, tall) {
   g.restore();
   curve(g, chart, line.map(([a, b]) => [x(a), y(b)]), C.site, 2);
   let com = null, pivot = null, parts = 0;
-  const moment = model.moment();
   if (side) {
-    const k = rowAt(side.time, moment), figures = model.document()?.figures;
+    const figures = model.document()?.figures;
     g.save();
     g.beginPath();
     g.rect(box.left, box.top, box.right - box.left, box.bottom - box.top);
@@ -119,7 +136,7 @@ function paint(g, width, tall) {
   const swatch = (draw) => swatches.glyph(draw);
   legend(g, 4, tall - 0.6 * t, width - 6, [...(side ? [[swatch((c, px_, py) => star(c, px_, py, false, 6)), "CoM"]] : []), [swatch((c, px_, py) => ring(c, px_, py, 4)), side ? "bucket pivot" : "end point"], [swatches.line(C.site, null, 2), "ground"]], 6);
   return {
-    state: { kind: "side", plan: model.offer()?.plan ?? null, step: step && { height: step.height, distance: step.distance }, time: Math.round(moment * 100) / 100, parts, com, pivot, scale: Math.round(px) },
+    state: { kind: "side", plan: model.offer()?.plan ?? null, step: step && { height: step.height, distance: step.distance }, window: [rounded(from[0]), rounded(to[0])], time: rounded(moment), parts, com, pivot, scale: Math.round(px) },
     age: 0,
     label: `Side view, true to scale${step ? `: a step ${metres(Math.abs(step.height))} ${step.height < 0 ? "down" : "high"}, ${metres(step.distance)} ahead` : ""}${com ? `; centre of mass ${metres(com[0])} along, ${metres(com[1])} up` : ""}`,
   };
