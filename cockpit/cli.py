@@ -30,6 +30,7 @@ from cockpit.cli_keys import LinkConfig, keys
 from cockpit.cli_plan import plan
 from cockpit.cli_playback import add_commands
 from cockpit.cli_recordings import recordings
+from cockpit.cli_surmount import surmount
 from cockpit.cli_track import track
 from cockpit.cli_use_case import use_case
 from cockpit.logs import LogJson, LogLevel
@@ -327,6 +328,7 @@ app.command()(detect)
 app.command()(track)
 app.command()(along)
 app.command()(plan)
+app.command()(surmount)
 app.command(name="use-case")(use_case)
 
 

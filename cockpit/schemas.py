@@ -38,6 +38,7 @@ from backend.documents.surmount_state import (
     SurmountRequest,
     SurmountStateDocument,
 )
+from backend.documents.surmount_task import SurmountTaskDocument
 from backend.documents.use_case import UseCaseDocument
 from backend.documents.use_case_state import UseCaseStateDocument
 from backend.documents.zone import ZoneFrameHeader
@@ -58,6 +59,7 @@ SCHEMAS: dict[str, tuple[type[BaseModel], str]] = {
     "plan-followed": (FollowedSeries, "/api/plan/MACHINE/PLAN/followed"),
     "plan-request": (PlanRequest, "what is posted to /api/plan"),
     "plan-state": (PlanStateDocument, "/api/plan, and the key plans of a snapshot"),
+    "surmount-task": (SurmountTaskDocument, "the task that surmount reads"),
     "surmount": (SurmountDocument, "what surmount --json prints"),
     "surmount-request": (SurmountRequest, "what is posted to /api/surmount"),
     "surmount-state": (SurmountStateDocument, "/api/surmount, and the key surmounts of a snapshot"),

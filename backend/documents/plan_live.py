@@ -155,12 +155,13 @@ def obstacles_of(name: str, snapshot: Snapshot, config: Config, ground: bool) ->
         body,
         others,
         site_of(name, snapshot.gauge, config),
-        _people(snapshot, config),
+        people_of(snapshot, config),
     )
     return Obstacles(found.boxes, found.names, ground)
 
 
-def _people(snapshot: Snapshot, config: Config) -> tuple[Boxes, tuple[str, ...]]:
+def people_of(snapshot: Snapshot, config: Config) -> tuple[Boxes, tuple[str, ...]]:
+    """Everybody who counts, as wide as `obstacles_of` takes them, in the site frame."""
     people, watch = snapshot.people, config.people
     if people is None or watch is None:
         return NO_BOXES, ()

@@ -98,7 +98,10 @@ class SurmountDocument(BaseModel):
     energy: float | None = Field(None, description="(19), of sequences 1, 2-1 and 2-2 [J]")
     energy_moves: float | None = Field(None, description="of reach, turn and stow [J]")
     energy_quasi_static: float | None = Field(None, description="[J]")
-    energy_potential: float | None = Field(None, description="m g h [J]")
+    energy_potential: float | None = Field(
+        None,
+        description="what heights of the centre of mass ask of any drive in those sequences [J]",
+    )
     parameters: SurmountParameters | None = None
     obstacle: SurmountObstacle | None = None
     candidates: list[SurmountCandidate] = Field(default_factory=list)

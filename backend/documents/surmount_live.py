@@ -11,14 +11,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from backend.collision.closest import closest_pairs
-from backend.documents.plan_live import FAST, kept, obstacles_of, unknown
+from backend.documents.plan_live import FAST, kept, people_of, unknown
 from backend.documents.surmount_state import SurmountRequest
 from backend.errors import InputError
 from backend.machine.kinematics import body_boxes, link_poses
 from backend.machine.model import Machine
 from backend.pipeline.config import Config
 from backend.pipeline.records import Snapshot
-from backend.spatial.boxes import Boxes
+from backend.pipeline.surroundings import within
+from backend.pipeline.working_gauge import site_of
+from backend.spatial.boxes import Boxes, concatenated
 from backend.spatial.rotation import to_attitude
 from backend.spatial.types import Array, BoolArray
 
@@ -28,6 +30,8 @@ LEAST = 0.01
 """Lower than this over the ground is no step [m]."""
 NEARER = 0.05
 """What is measured anew may seem this much nearer than before [m]."""
+TRAVEL = 15.0
+"""Beyond the edge, no manoeuvre goes [m]."""
 CONTACT = 0.01
 """Contact, whatever was near before [m]."""
 INSTANTS = 150
@@ -101,10 +105,17 @@ def around(
         raise InputError(f"{config.labels[name]}: how far poses may be wrong is not known.")
     body = snapshot.machines[name].body
     assert body is not None
-    found = obstacles_of(name, snapshot, config, ground=False)
-    others = np.array([not _is(one, step.name) for one in found.names], dtype=bool)
-    boxes = found.boxes.take(others).moved(body.link_poses[0])
-    return boxes, tuple(n for n, on in zip(found.names, others, strict=True) if on), keep
+    site = site_of(name, snapshot.gauge, config)
+    boxes, names = [site.boxes], [*site.full_names]
+    for other, state in snapshot.machines.items():
+        if other != name and state.body is not None:
+            boxes.append(state.body.boxes)
+            names += [f"{other}:{part}" for part in config.machines[other].body_names]
+    people, whose = people_of(snapshot, config)
+    found, names = concatenated([*boxes, people]), [*names, *whose]
+    radius = config.machines[name].bounding_radius + step.distance + TRAVEL
+    on = within(found, body, radius) & [not _is(one, step.name) for one in names]
+    return found.take(on), tuple(n for n, near in zip(names, on, strict=True) if near), keep
 
 
 def step_of(name: str, boxes: Boxes, k: int, T_site_root: Array) -> Step | str:

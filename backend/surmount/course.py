@@ -41,8 +41,11 @@ class Leg:
     z: float
 
 
-def legs(edges: tuple[Edge, ...]) -> tuple[Leg, ...]:
-    """Raises InputError unless the edges follow each other and rise or fall."""
+def legs(edges: tuple[Edge, ...], depth: float = math.inf) -> tuple[Leg, ...]:
+    """depth: of the level ground behind the last edge [m].
+
+    Raises InputError unless the edges follow each other and rise or fall.
+    """
     found, ground = [], 0.0
     for k, edge in enumerate(edges):
         if not (math.isfinite(edge.x) and math.isfinite(edge.rise)) or edge.rise == 0.0:
@@ -50,7 +53,7 @@ def legs(edges: tuple[Edge, ...]) -> tuple[Leg, ...]:
         if k and edge.x <= edges[k - 1].x:
             raise InputError(f"edge {k + 1} is not beyond edge {k}: allowed are rising x.")
         before = math.inf if k == 0 else edge.x - edges[k - 1].x
-        after = math.inf if k == len(edges) - 1 else edges[k + 1].x - edge.x
+        after = depth if k == len(edges) - 1 else edges[k + 1].x - edge.x
         down = edge.rise < 0.0
         if down:
             # Seen from below: its top is the ground before it, and where that ends, it falls.

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 
 from backend.contact.world import ContactWorld
 from backend.surmount.judge import judge
 from backend.surmount.machine import Climber
 from backend.surmount.records import Step
-from backend.surmount.run import fine, run
-from backend.surmount.search import HALVES, ROWS, Job, Simulated
+from backend.surmount.run import fine, run, world_of
+from backend.surmount.search import HALVES, ROWS, Job, Simulate, Simulated
 
 
 def simulated(climber: Climber, step: Step, world: ContactWorld, job: Job) -> Simulated:
@@ -25,3 +27,14 @@ def simulated(climber: Climber, step: Step, world: ContactWorld, job: Job) -> Si
             return Simulated(math.inf, f"{one.name}: {made.why}")
         energy += made.total
     return Simulated(energy if sequences else math.inf, "" if sequences else "cannot begin")
+
+
+@contextmanager
+def one_by_one(climber: Climber, step: Step) -> Iterator[Simulate]:
+    """What simulates halves here, one after the other."""
+    world = world_of(climber, step)
+
+    def simulate(jobs: Sequence[Job]) -> list[Simulated]:
+        return [simulated(climber, step, world, job) for job in jobs]
+
+    yield simulate

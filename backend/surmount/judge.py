@@ -42,7 +42,8 @@ that the crawler's pressure stays off the edge."""
 @dataclass(frozen=True, eq=False)
 class Sequence:
     """One sequence worked out. lines: (m, 2, 3) of what bears the machine, see `support.margin`;
-    lines_z: (m, 2) their heights [m]; zmp: (m, 2) [m]; margin: (m,) [m]; duration [s].
+    lines_z: (m, 2) their heights [m]; zmp: (m, 2) [m]; margin: (m,) [m]; duration [s]; potential:
+    the least that any drive must do [J], as heights of the centre of mass ask for it.
     """
 
     name: str
@@ -55,6 +56,7 @@ class Sequence:
     lines_z: Array
     zmp: Array
     margin: Array
+    potential: float
 
 
 def course_of(
@@ -102,6 +104,7 @@ def worked_out(climber: Climber, step: Step, name: str, course: Course, joints: 
         lines_z,
         points,
         margin(points, lines),
+        climber.weight * float(np.abs(np.diff(weights.centre[:, 2])).sum()),
     )
 
 
@@ -249,9 +252,12 @@ def _belts(climber: Climber, step: Step, course: Course) -> float:
 
 
 def clearance_of(placed: Array, step: Step) -> Array:
-    """(..., B) of bodies with corners (..., B, 8, 3) to risers, tops and ground [m]."""
+    """(m - 1, B) of bodies with corners (m, B, 8, 3) to risers, tops and ground [m]: of what each
+    covers on its way from one row to the next, taken as straight.
+    """
     flat = placed[..., [0, 2]]
-    found = [body_clearance(flat - np.array([x, 0.0]), h) for x, h in step.risers]
+    swept = np.concatenate([flat[:-1], flat[1:]], axis=-2) if len(flat) > 1 else flat
+    found = [body_clearance(swept - np.array([x, 0.0]), h) for x, h in step.risers]
     return np.asarray(np.minimum.reduce(found))
 
 

@@ -38,6 +38,8 @@ STARTS = 3
 DEAR = 3.0
 """What does not hold costs this many times the best that does, and more."""
 ROWS = 31
+SPARE = 0.15
+"""Of clearance and margin, that a search keeps beyond what is demanded."""
 
 
 class Job(NamedTuple):
@@ -81,11 +83,15 @@ class Found:
     spline: Spline | None = None
 
 
+_Rated = tuple[Parameters, float]
+
+
 @dataclass
 class Search:
     """One step and machine. told: hears of done, of, in words, and says whether to go on.
 
-    simulations: how many halves were simulated; kept: all of them.
+    simulations: how many halves were simulated; kept: all of them; refusals: by kind how often
+    it was what did not hold first, and the verdict that came nearest to holding.
     """
 
     climber: Climber
@@ -96,10 +102,20 @@ class Search:
     kept: dict[tuple[Half, tuple[float, ...]], Simulated] = field(default_factory=dict)
     simulations: int = 0
     own: Sweep | None = None
+    refusals: dict[str, tuple[int, Verdict]] = field(default_factory=dict)
+    strict: Climber = field(init=False)
 
     def __post_init__(self) -> None:
         if self.own is None:
             self.own = own_bodies(self.climber)
+        # Between the rows of a search a little more is lost than between those of the last look.
+        demands = self.climber.demands
+        more = replace(
+            demands,
+            clearance=demands.clearance + SPARE * demands.clearance,
+            margin=demands.margin + SPARE * demands.margin,
+        )
+        self.strict = replace(self.climber, demands=more)
 
     @property
     def boom(self) -> float:
@@ -126,7 +142,7 @@ class Search:
     def verdict(self, half: Half, parameters: Parameters, spline: Spline | None = None) -> Verdict:
         """What holds of one half."""
         return judge(
-            self.climber, self.step, parameters, spline, ROWS, self.own, HALVES[half], quick=True
+            self.strict, self.step, parameters, spline, ROWS, self.own, HALVES[half], quick=True
         )[0]
 
     def energies(self, jobs: Sequence[Job], words: str = "") -> list[float]:
@@ -143,9 +159,9 @@ class Search:
                 raise CancelledError
         return [self.kept[job.half, job.key].energy for job in jobs]
 
-    def batch(self, around: Parameters | None = None) -> list[Found]:
+    def batch(self, around: Parameters | None = None, simulated: bool = True) -> list[Found]:
         """All that hold on a grid, the best first: the coarse one over the bounds, or the fine one
-        up to 3 increments around parameters.
+        up to 3 increments around parameters. simulated: else with quasi-static energies.
         """
         bounds = self.bounds()
         if around is None:
@@ -154,7 +170,7 @@ class Search:
                 np.arange(low, high + 1e-9, step)
                 for (low, high), step in zip(bounds, steps, strict=True)
             ]
-            words = "coarse"
+            words = "coarse batch"
         else:
             steps = np.array([FINE * self.boom] * 3 + [FINE_LEAN])
             middle = around.free
@@ -162,50 +178,55 @@ class Search:
             for k in range(4):
                 axis = middle[k] + steps[k] * np.arange(-3, 4)
                 axes.append(axis[(axis >= bounds[k, 0] - 1e-9) & (axis <= bounds[k, 1] + 1e-9)])
-            words = "fine"
+            words = "fine batch"
         front, back = self._grids(axes)
-        values = self.energies(front + back, f"{words} batch")
-        ahead = dict(
-            zip(
-                [(j.parameters.p1, j.parameters.p2, j.parameters.alpha_f) for j in front],
-                values,
-                strict=False,
-            )
-        )
-        behind = dict(
-            zip(
-                [(j.parameters.p3, j.parameters.alpha_f) for j in back],
-                values[len(front) :],
-                strict=True,
-            )
-        )
-        found = []
-        for (p1, p2, alpha), e1 in ahead.items():
-            for (p3, lean), e2 in behind.items():
-                if lean == alpha and np.isfinite(e1 + e2):
-                    found.append(Found(Parameters(p1, p2, p3, self.p4, alpha), e1 + e2, words))
+        if simulated:
+            jobs = [Job("front", one) for one, _ in front] + [Job("back", one) for one, _ in back]
+            values = self.energies(jobs, words)
+            front = [(one, e) for (one, _), e in zip(front, values[: len(front)], strict=True)]
+            back = [(one, e) for (one, _), e in zip(back, values[len(front) :], strict=True)]
+        found = [
+            Found(replace(one, p3=other.p3), e1 + e2, words if simulated else "quasi-static batch")
+            for one, e1 in front
+            for other, e2 in back
+            if one.alpha_f == other.alpha_f and np.isfinite(e1 + e2)
+        ]
         return sorted(found, key=lambda one: one.energy)
 
-    def _grids(self, axes: list[Array]) -> tuple[list[Job], list[Job]]:
-        front: list[Job] = []
-        back: list[Job] = []
-        p1s, p2s, p3s, leans_ = axes
-        for n, alpha in enumerate(leans_):
-            if not self.told(n, len(leans_), "which parameters hold"):
+    def _grids(self, axes: list[Array]) -> tuple[list[_Rated], list[_Rated]]:
+        """What holds of front and back, with quasi-static energies."""
+        front: list[_Rated] = []
+        back: list[_Rated] = []
+        p1s, p2s, p3s, slopes = axes
+        most = self.climber.machine.sun
+        stretch = sum(most.lengths[:3])
+        for n, alpha in enumerate(slopes):
+            if not self.told(n, len(slopes), "which parameters hold"):
                 raise CancelledError
             first = Parameters(float(p1s[0]), float(p2s[0]), float(p3s[0]), self.p4, float(alpha))
+            behind = []
             for p3 in p3s:
                 tried = replace(first, p3=float(p3))
-                if self.verdict("back", tried).holds:
-                    back.append(Job("back", tried))
-            if not back or back[-1].parameters.alpha_f != first.alpha_f:
+                # Maximum stretch (21).
+                if p3 + self.p4 <= stretch:
+                    behind += self._rated("back", tried)
+            if not behind:
                 continue
+            back += behind
             for p1 in p1s:
-                for p2 in p2s:
-                    tried = replace(first, p1=float(p1), p2=float(p2))
-                    if self.verdict("front", tried).holds:
-                        front.append(Job("front", tried))
+                for p2 in p2s[p1 + p2s <= stretch]:
+                    front += self._rated("front", replace(first, p1=float(p1), p2=float(p2)))
         return front, back
+
+    def _rated(self, half: Half, tried: Parameters) -> list[_Rated]:
+        verdict = self.verdict(half, tried)
+        if verdict.holds:
+            return [(tried, verdict.energy)]
+        count, nearest = self.refusals.get(verdict.kind, (0, verdict))
+        if verdict.values.min() > nearest.values.min():
+            nearest = verdict
+        self.refusals[verdict.kind] = count + 1, nearest
+        return []
 
     def cost(self, tried: Sequence[Parameters], dear: float) -> list[float]:
         """[J] of each; what does not hold costs `dear` [J] and more, without being simulated."""
@@ -251,7 +272,7 @@ class Search:
 
         def left(x: Array) -> Array:
             made = [
-                judge(self.climber, self.step, at(x), None, ROWS, self.own, names)[0].values
+                judge(self.strict, self.step, at(x), None, ROWS, self.own, names)[0].values
                 for names in HALVES.values()
             ]
             return np.asarray(np.clip(np.concatenate(made), -10.0, 10.0))
