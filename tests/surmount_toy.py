@@ -82,7 +82,9 @@ def document(
     energy = np.cumsum(np.abs(np.gradient(joints, axis=0) * torque).sum(axis=1))
     starts = np.array([start for _, start, _ in PHASES])
     index = np.clip(np.searchsorted(starts, t, side="right") - 1, 0, None)
-    com = np.column_stack([along - distance + 0.1 * np.cos(joints[:, 0]), base[:, 2] - base[0, 2] + 0.7])
+    com = np.column_stack(
+        [along - distance + 0.1 * np.cos(joints[:, 0]), base[:, 2] - base[0, 2] + 0.7]
+    )
     return SurmountDocument.model_validate(
         {
             "ok": True, "machine": name, "method": "search", "duration": float(t[-1]),

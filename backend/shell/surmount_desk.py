@@ -450,7 +450,9 @@ class SurmountDesk:
 
 def _one_of(whole: SurmountDocument, k: int, made: SurmountDocument) -> SurmountDocument:
     """What was made of candidate k, with all candidates beside it."""
-    candidates = [one.model_copy(update={"chosen": i == k}) for i, one in enumerate(whole.candidates)]
+    candidates = [
+        one.model_copy(update={"chosen": i == k}) for i, one in enumerate(whole.candidates)
+    ]
     if made.ok and not candidates[k].simulated:
         known = {"energy": made.energy, "simulated": True}
         candidates[k] = candidates[k].model_copy(update=known)
