@@ -156,7 +156,8 @@ class Follow:
     seen; ended: why it is over, empty while it is not; trail: (own clock, path's time) of the last
     cycles [s, s]; wish: (n,) of the last cycle [rad/s], None where nothing was wished for; needed:
     (n,) the path's part of it; tracks: (2,) wished for in the last cycle [m/s]; seen: the path's
-    time at which the base should have been where it was seen [s].
+    time at which the base should have been where it was seen [s]; fresh: nothing moved yet since it
+    was accepted, at its beginning or where it was left.
     """
 
     trajectory: Trajectory
@@ -169,6 +170,7 @@ class Follow:
     needed: Array | None = None
     tracks: Array = field(default_factory=lambda: np.zeros(2))
     seen: float = 0.0
+    fresh: bool = True
 
     @property
     def arrived(self) -> bool:
@@ -219,8 +221,9 @@ def advance(
     most = float(np.abs(error).max())
     trail = _kept(follow, clock)
     follow = replace(follow, error=error, trail=trail, wish=None, needed=None, seen=then)
-    if follow.at == 0.0 and most > NEAR:
-        far = f"{np.degrees(most):.0f} degrees from where the trajectory begins"
+    if follow.fresh and most > NEAR:
+        where_to = "the trajectory begins" if follow.at == 0.0 else "it was left"
+        far = f"{np.degrees(most):.0f} degrees from where {where_to}"
         return replace(follow, ended=f"{far}; plan again"), still
     if most > LOST:
         return replace(follow, ended=f"{np.degrees(most):.0f} degrees off; plan again"), still
@@ -240,7 +243,8 @@ def advance(
     _, rates = path.at(at)
     needed, wish = pace * rates, pace * rates + GAIN * error
     tracks = pace * _driven(path, at + pace * lead, then, T_site_root)
-    return replace(follow, at=at, pace=pace, wish=wish, needed=needed, tracks=tracks), wish
+    follow = replace(follow, at=at, pace=pace, tracks=tracks, fresh=False)
+    return replace(follow, wish=wish, needed=needed), wish
 
 
 def stands_within(path: Trajectory, lag: float, acceleration: float) -> float:
@@ -288,6 +292,20 @@ def _driven(path: Trajectory, t: float, seen: float, T_site_root: Array | None) 
     behind = float((wanted[:3, 3] - T_site_root[:3, 3]) @ T_site_root[:3, 0])
     most = MADE_UP * abs(forward)
     return np.asarray(speeds + min(max(GAIN * behind, -most), most))
+
+
+def taken_up(follow: Follow) -> Follow:
+    """What ended on the way, once more from there."""
+    return Follow(follow.trajectory, at=follow.at, seen=follow.seen)
+
+
+def left_at(path: Trajectory, at: float, q: Array, T: Array, continuous: Array | None) -> bool:
+    """Whether a machine at q (n,), its base at T (4, 4), still is about where it left a path, at a
+    time of that [s].
+    """
+    where = _where(path, q, at, continuous)
+    off = _apart(path.at(where)[0] - q, continuous)
+    return float(np.abs(off).max()) < NEAR and not beside(path, where, T)
 
 
 def allowed(follow: Follow, sent: Array, tracks: Array | None = None) -> Follow:

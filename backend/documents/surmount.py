@@ -26,6 +26,7 @@ from backend.machine.kinematics import end_point
 from backend.machine.model import Machine
 from backend.site.named_bodies import NO_SITE_BODIES, SiteBodies
 from backend.spatial import rotation
+from backend.spatial.boxes import concatenated
 from backend.spatial.types import Array
 from backend.stability.dynamics import centre_of_mass
 from backend.surmount.course import Edge
@@ -120,10 +121,11 @@ def surmount_document(
     if not made.ok:
         return made
     # Everything else that stands there, partners included.
-    around = scene.around(task.machine)
-    others = [k for k, one in enumerate(around.names) if not _same(one, name)]
-    boxes = around.boxes.take(np.array(others, dtype=int)).moved(T)
-    names = tuple(around.names[k] for k in others)
+    others = {n: one.boxes for n, one in scene.placed.items() if n != task.machine}
+    boxes = concatenated([scene.site.boxes, *others.values()])
+    names = (*scene.site.names, *(n for n, one in others.items() for _ in range(len(one))))
+    left = np.array([not _same(one, name) for one in names], dtype=bool)
+    boxes, names = boxes.take(left), tuple(n for n, on in zip(names, left, strict=True) if on)
     base = np.array(made.base)
     base[:, :3] -= scene.origin
     poses = poses_of(base)

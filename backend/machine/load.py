@@ -113,6 +113,7 @@ def load_machine(
         notes.append("no rated payload is stated; 0 kg is used")
     if not side.masses_trusted:
         notes.append("masses are not trusted: nothing is concluded from them")
+    notes += [f"assumed: {what}" for what in side.assumed]
     return replace(machine, assumptions=tuple(notes))
 
 

@@ -114,6 +114,7 @@ class Sidecar(Table):
     title: str | None = None
     payload: Annotated[float, Field(ge=0.0, allow_inf_nan=False)] | None = None
     masses_trusted: bool = False
+    assumed: tuple[str, ...] = ()  # what of the description is, in words
     joints: dict[Role, str] = {}
     limits: dict[Role, Limit] = {}
     end_point: PointOnLink | None = None

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from backend.control.follow import NEAR, Trajectory
+from backend.control.follow import NEAR, Trajectory, left_at
 from backend.documents.plan_live import unknown
 from backend.documents.surmount_document import SurmountDocument
 from backend.documents.surmount_live import LiveSurmount, around, live_surmount
@@ -352,13 +352,21 @@ class SurmountDesk:
         if why:
             return "unknown", why
         progress, at = self._followed(machine), 0.0
+        body, q = snapshot.machines[machine].body, snapshot.machines[machine].pose.joints
+        assert body is not None
         if progress is not None and progress.plan == plan.name:
-            if progress.ended:
-                return ("done", "") if progress.arrived else ("void", progress.ended)
+            if progress.arrived:
+                return "done", ""
             at = progress.at
+            if progress.ended and at > 0.0:
+                # It can be taken up where it was left, as long as the machine is still there.
+                ends = np.array([j.continuous for j in self._config.machines[machine].joints])
+                path = answer.trajectory
+                if not left_at(path, at, q, body.link_poses[0], ends):
+                    return "void", progress.ended
+            elif progress.ended:
+                return "void", progress.ended
         if at <= 0.0:
-            body, q = snapshot.machines[machine].body, snapshot.machines[machine].pose.joints
-            assert body is not None
             why = elsewhere(live.T_site_root, body.link_poses[0], DRIVEN)
             if why:
                 return "void", why
@@ -442,7 +450,9 @@ class SurmountDesk:
 
 def _one_of(whole: SurmountDocument, k: int, made: SurmountDocument) -> SurmountDocument:
     """What was made of candidate k, with all candidates beside it."""
-    candidates = [one.model_copy(update={"chosen": i == k}) for i, one in enumerate(whole.candidates)]
+    candidates = [
+        one.model_copy(update={"chosen": i == k}) for i, one in enumerate(whole.candidates)
+    ]
     if made.ok and not candidates[k].simulated:
         known = {"energy": made.energy, "simulated": True}
         candidates[k] = candidates[k].model_copy(update=known)

@@ -46,12 +46,13 @@ def legs(edges: tuple[Edge, ...], depth: float = math.inf) -> tuple[Leg, ...]:
 
     Raises InputError unless the edges follow each other and rise or fall.
     """
-    found, ground = [], 0.0
     for k, edge in enumerate(edges):
         if not (math.isfinite(edge.x) and math.isfinite(edge.rise)) or edge.rise == 0.0:
             raise InputError(f"edge {k + 1}: x and rise must be finite, and rise not 0.")
         if k and edge.x <= edges[k - 1].x:
-            raise InputError(f"edge {k + 1} is not beyond edge {k}: allowed are rising x.")
+            raise InputError(f"edge {k + 1} is not beyond edge {k}: allowed are rising distances.")
+    found, ground = [], 0.0
+    for k, edge in enumerate(edges):
         before = math.inf if k == 0 else edge.x - edges[k - 1].x
         after = depth if k == len(edges) - 1 else edges[k + 1].x - edge.x
         down = edge.rise < 0.0

@@ -60,30 +60,24 @@ def belt_clearance(x: Array, z: Array, alpha: Array, h: float, a: float, r: floa
     c, s = np.cos(alpha), np.sin(alpha)
     middle = np.stack([x - r * s, z + r * c], axis=-1)
     along = np.stack([c, s], axis=-1)
-    left = np.inf
-    for side in (-1.0, 1.0):
-        p = middle + side * a * along
-        # To the quadrant x >= 0, z <= h from outside, and how deep within.
-        out = np.maximum(np.stack([-p[..., 0], p[..., 1] - h], axis=-1), 0.0)
-        inside = np.minimum(np.stack([-p[..., 0], p[..., 1] - h], axis=-1).max(axis=-1), 0.0)
-        left = np.minimum(left, np.hypot(out[..., 0], out[..., 1]) + inside)
-    # The edge itself to the segment between the wheels' centres; below it, it is inside.
-    from_middle = np.array([0.0, h]) - middle
-    t = (from_middle * along).sum(axis=-1)
-    across = from_middle[..., 1] * c - from_middle[..., 0] * s
-    beside = np.where(np.abs(t) <= a, -across, np.inf)
-    return np.asarray(np.minimum(left, beside) - r)
+    ends = np.stack([middle - a * along, middle + a * along], axis=-2)
+    apart, meets = _to_quadrant(ends, h)
+    return np.asarray(np.where(meets < 0.0, meets, apart) - r)
 
 
 def body_clearance(corners: Array, h: float) -> Array:
-    """(...) of convex bodies with corners (..., 8, 2), x and z, to step and ground, from below
-    [m]: no body is nearer, and negative where one is inside.
+    """(...) of convex bodies with corners (..., k, 2), x and z, to step and ground, negative inside
+    [m]."""
+    apart, meets = _to_quadrant(corners, h)
+    return np.asarray(np.minimum(corners[..., 1].min(axis=-1), np.where(meets < 0.0, meets, apart)))
 
-    A body is clear of the step when all of it is before it, or what of it is over the top is above
-    that: the larger of both is told.
+
+def _to_quadrant(corners: Array, h: float) -> tuple[Array, Array]:
+    """(...) distance of the hull of corners (..., k, 2) to the quadrant x >= 0, z <= h where they
+    are apart, and the larger of what all of it is before x = 0 and what of it is over the top is
+    above that: below 0 where they meet.
     """
     x, z = corners[..., 0], corners[..., 1]
-    above = z.min(axis=-1)
     before = -x.max(axis=-1)
     i, j = np.triu_indices(corners.shape[-2], 1)
     xi, xj, zi, zj = x[..., i], x[..., j], z[..., i], z[..., j]
@@ -91,4 +85,10 @@ def body_clearance(corners: Array, h: float) -> Array:
     with np.errstate(divide="ignore", invalid="ignore"):
         at = np.where(crosses, zi + (zj - zi) * (-xi) / np.where(crosses, xj - xi, 1.0), np.inf)
     over = np.minimum(at.min(axis=-1), np.where(x >= 0.0, z, np.inf).min(axis=-1)) - h
-    return np.asarray(np.minimum(above, np.maximum(over, before)))
+    # The nearest points are a corner of the body, or the edge and a side of it.
+    of_corners = np.hypot(np.maximum(-x, 0.0), np.maximum(z - h, 0.0)).min(axis=-1)
+    dx, dz = xj - xi, zj - zi
+    length = np.maximum(dx**2 + dz**2, 1e-300)
+    t = np.clip((-xi * dx + (h - zi) * dz) / length, 0.0, 1.0)
+    of_edge = np.sqrt(((xi + t * dx) ** 2 + (zi + t * dz - h) ** 2).min(axis=-1))
+    return np.minimum(of_corners, of_edge), np.maximum(over, before)

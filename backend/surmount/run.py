@@ -8,6 +8,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from backend.contact.world import STEP, ContactWorld, Options
+from backend.spatial import rotation
 from backend.spatial.boxes import Boxes
 from backend.spatial.types import Array
 from backend.surmount.judge import Sequence, course_of
@@ -77,10 +78,14 @@ def terrain(climber: Climber, step: Step) -> Boxes:
     return Boxes(centres, np.broadcast_to(np.eye(3), (len(half), 3, 3)).copy(), half)
 
 
-def world_of(climber: Climber, step: Step) -> ContactWorld:
-    """To go through as many motions as one likes."""
-    payload = climber.demands.payload
-    return ContactWorld(climber.machine, payload, terrain(climber, step), options_of(climber))
+def world_of(climber: Climber, step: Step, turned: float = 0.0) -> ContactWorld:
+    """To go through as many motions as one likes. turned: the step about its edge's middle, seen
+    from above [rad]."""
+    boxes = terrain(climber, step)
+    if turned:
+        R = rotation.rz(turned)
+        boxes = Boxes(boxes.centers @ R.T, R @ boxes.rotations, boxes.half_extents)
+    return ContactWorld(climber.machine, climber.demands.payload, boxes, options_of(climber))
 
 
 def fine(
@@ -114,8 +119,9 @@ def fine(
     )
 
 
-def run(climber: Climber, world: ContactWorld, motion: Motion) -> Run:
-    """motion: with rows of `world.options.step`, apart."""
+def run(climber: Climber, world: ContactWorld, motion: Motion, kept: float = LOST) -> Run:
+    """motion: with rows of `world.options.step`, apart; kept: how far the crawler may lean from
+    what was planned, to either side as well [rad]."""
     dt, n = world.options.step, motion.q.shape[1]
     before, after = round(SETTLED / dt), round(AFTER / dt)
     belts = np.repeat(climber.demands.facing * motion.belts[:, None], 2, axis=1)
@@ -141,10 +147,10 @@ def run(climber: Climber, world: ContactWorld, motion: Motion) -> Run:
         drives[k], edge[k] = data.efc_force[: drives.shape[1]], data.site_xpos[site]
         if k % 5 == 0 and k >= before:
             deepest = max(deepest, world.deepest())
-    kept = slice(before, before + len(motion.q))
-    torques, place, speed, edge = force[kept], place[kept], speed[kept], edge[kept]
+    shown = slice(before, before + len(motion.q))
+    torques, place, speed, edge = force[shown], place[shown], speed[shown], edge[shown]
     q, rates = place[:, world.joint_places], speed[:, world.joint_dofs]
-    motors = (drives[kept] * speed[:, world.belt_dofs]).reshape(-1, 2, 3)
+    motors = (drives[shown] * speed[:, world.belt_dofs]).reshape(-1, 2, 3)
     work = np.abs(torques[1:] * np.diff(q, axis=0)).sum(axis=1)
     work = work + np.abs(0.5 * (motors[1:] + motors[:-1]).sum(axis=2) * dt).sum(axis=1)
     T = world.poses_of(place[:, :7])
@@ -152,8 +158,8 @@ def run(climber: Climber, world: ContactWorld, motion: Motion) -> Run:
     off = np.linalg.norm(T[:, :3, 3] - motion.T_step_root[:, :3, 3], axis=1)
     beside = np.abs(_angles(T[:, 2, 1]))
     why = ""
-    if max(np.abs(lean).max(), beside.max()) > LOST or not np.isfinite(place).all():
-        at = int(np.argmax((np.abs(lean) > LOST) | (beside > LOST)))
+    if max(np.abs(lean).max(), beside.max()) > kept or not np.isfinite(place).all():
+        at = int(np.argmax((np.abs(lean) > kept) | (beside > kept)))
         why = f"it falls or slides after {motion.time[at]:.1f} s"
     elif off.max() > ASTRAY * 2.0 * climber.a:
         at = int(np.argmax(off > ASTRAY * 2.0 * climber.a))

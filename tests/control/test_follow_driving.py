@@ -9,7 +9,16 @@ import numpy as np
 import pytest
 
 from backend.control.climb import Climb, Phase
-from backend.control.follow import ARRIVED, Follow, Trajectory, advance, allowed
+from backend.control.follow import (
+    ARRIVED,
+    Follow,
+    Trajectory,
+    advance,
+    allowed,
+    left_at,
+    stands_within,
+    taken_up,
+)
 from backend.errors import InputError
 from backend.machine.load import load_machine
 from backend.shell.sim.dynamics import Demand, Hydraulics, SimState, limits_of, step
@@ -156,6 +165,27 @@ def test_a_base_that_pitches_otherwise_ends_it() -> None:
     assert not follow.tracks.any()
 
 
+def test_let_go_it_stands_within_half_of_the_tolerance() -> None:
+    fastest = stands_within(path(), 0.2, 0.6)
+    state = SimState(path().joints[0], np.zeros(4), np.zeros(3), 0.0, 0.0, 0.0, np.full(2, fastest))
+    for _ in range(400):
+        still = Demand(np.zeros(4), np.zeros(2))
+        state = step(state, still, limits_of(MACHINE), LAGS, 0.005)
+    assert 0.6 * 0.05 < state.position[0] < 0.05
+
+
+def test_it_drives_no_faster_than_it_may() -> None:
+    way = path()
+    follow = Follow(way)
+    for _ in range(200):
+        q, T = way.at(follow.seen)[0], way.base_at(follow.seen)
+        follow, _ = advance(follow, q, 0.2, True, DT, None, T, 0.12, 0.11)
+        assert np.abs(follow.tracks).max() <= 0.11 * 1.5 + 1e-9
+        driven = float(np.abs(way.tracks_at(follow.at)).max()) * follow.pace
+        assert driven <= 0.115
+    assert follow.pace < 0.7
+
+
 def test_a_base_that_is_not_known_stands() -> None:
     way = path()
     for unknown in (None, np.full((4, 4), np.nan)):
@@ -213,6 +243,45 @@ def test_what_makes_no_sense_is_refused() -> None:
     for bad in ({"obstacles": ()}, {"phases": ()}, {"margin": np.full(201, np.nan)}):
         with pytest.raises(InputError):
             replace(climb, **bad)  # type: ignore[arg-type]
+
+
+def test_what_was_left_is_taken_up_where_the_machine_is() -> None:
+    way = path()
+    follow, states, _ = drive(way, 3.0)
+    # Stopped at speed it runs on; then it stands, and is found there.
+    stopped = replace(follow, ended="Stop")
+    state, limits = states[-1], limits_of(MACHINE)
+    for _ in range(60):
+        state = step(state, Demand(np.zeros(4), np.zeros(2)), limits, LAGS, DT)
+    assert left_at(way, stopped.at, state.q, state.T_site_root, None)
+    again = taken_up(stopped)
+    assert again.ended == ""
+    assert again.fresh
+    again, wish = advance(again, state.q, 0.24, False, DT, None, state.T_site_root)
+    assert not wish.any()
+    assert again.at == pytest.approx(stopped.at, abs=0.6)
+    assert np.abs(again.error).max() < np.radians(1.0)  # type: ignore[arg-type]
+    for _ in range(900):
+        again, wish = advance(
+            again, state.q, LAGS.joint_lag, True, DT, None, state.T_site_root, 0.12
+        )
+        assert not again.ended or again.ended == ARRIVED
+        state = step(state, Demand(wish, again.tracks), limits, LAGS, DT)
+    assert again.ended == ARRIVED
+
+
+def test_what_was_moved_away_is_not_taken_up() -> None:
+    way = path()
+    follow, states, _ = drive(way, 3.0)
+    state, stopped = states[-1], replace(follow, ended="Stop")
+    moved = state.q + np.array([0.0, 0.0, 0.1, 0.0])
+    assert not left_at(way, stopped.at, moved, state.T_site_root, None)
+    driven = state.T_site_root.copy()
+    driven[:3, 3] += 0.2
+    assert not left_at(way, stopped.at, state.q, driven, None)
+    again, wish = advance(taken_up(stopped), moved, 0.24, True, DT, None, state.T_site_root)
+    assert again.ended == "6 degrees from where it was left; plan again"
+    assert not wish.any()
 
 
 def test_phases_are_told_by_time() -> None:

@@ -10,6 +10,7 @@ from test_driving_seats import MIDDLE, MINI, Cockpit, N
 
 from backend.control.follow import Trajectory
 from backend.control.person import OPERATOR
+from backend.fusion.pose import Validity
 from backend.safety.record import Concern, Level
 from backend.shell.app.driving_models import SeatModel
 from backend.shell.driving.driving import Driving
@@ -44,6 +45,8 @@ class Following(Cockpit):
         )
         self.q, self.rate = MIDDLE.copy(), np.zeros(N)
         self.least = 1.0  # of the limiter's fraction
+        self.travel = 1.0
+        self.base, self.speed, self.seen = np.eye(4), 0.0, Validity.VALID
         self.void = ""
 
     def offered(self, machine: str, plan: str) -> Trajectory | str:
@@ -61,19 +64,28 @@ class Following(Cockpit):
             now = self.radio.now
             allowed = np.full((N, 2), self.allowed)
             concern = Concern(
-                *("partner", "left", self.level, "why", allowed, np.ones(2)), None, now
+                *("partner", "left", self.level, "why", allowed, np.full(2, self.travel)), None, now
             )
             pose = SimpleNamespace(
-                joints=self.q.copy(), time=now, streams={"joints": SimpleNamespace(age=0.0)}
+                joints=self.q.copy(),
+                time=now,
+                streams={"joints": SimpleNamespace(age=0.0)},
+                validity=self.seen,
             )
+            body = SimpleNamespace(link_poses=self.base.copy()[None])
             snapshot: Any = SimpleNamespace(
-                time=now, machines={"left": SimpleNamespace(pose=pose)}, concerns=(concern,)
+                time=now,
+                machines={"left": SimpleNamespace(pose=pose, body=body)},
+                concerns=(concern,),
             )
             self.driving.cycle(snapshot)
             if self.outlet.sent:
                 wanted = self.outlet.sent[-1][0].joints
                 self.rate = self.rate + (wanted - self.rate) * period / 0.1
                 self.q = self.q + self.rate * period
+                tracks = float(self.outlet.sent[-1][0].tracks.mean())
+                self.speed = self.speed + (tracks - self.speed) * period / 0.22
+                self.base[0, 3] += self.speed * period
 
     def begin(self, plan: str = "p1") -> str:
         seat = self.sit(OPERATOR)

@@ -72,11 +72,19 @@ class Follows:
         self._by_machine: dict[str, Followed] = {}
 
     def accept(self, machine: str, seat: str, token: int, plan: str) -> str:
-        """Why not, empty when it is followed from now on, as soon as the dead-man is held."""
+        """Why not, empty when it is followed from now on, as soon as the dead-man is held.
+
+        A climb that ended on its way is taken up where it was left: nobody should have to leave a
+        machine there.
+        """
         trajectory = self._plans.offered(machine, plan)
         if isinstance(trajectory, str):
             return trajectory
-        self._by_machine[machine] = Followed(seat, token, plan, Follow(trajectory))
+        follow, last = Follow(trajectory), self._by_machine.get(machine)
+        again = last is not None and (last.plan, last.token) == (plan, token)
+        if last is not None and again and trajectory.climb is not None and _left(last.follow):
+            follow = rules.taken_up(last.follow)
+        self._by_machine[machine] = Followed(seat, token, plan, follow)
         return ""
 
     def drop(self, machine: str, seat: str) -> None:
@@ -177,6 +185,10 @@ class Follows:
         for machine, one in found:
             self._by_machine[machine] = replace(one, told=True)
         return found
+
+
+def _left(follow: Follow) -> bool:
+    return bool(follow.ended) and not follow.arrived and follow.at > 0.0
 
 
 def _surmounting(followed: Followed, climb: Climb, now: float) -> Surmounting:
