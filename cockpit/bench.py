@@ -34,6 +34,7 @@ from cockpit.bench_plan import plan_rows
 from cockpit.bench_recording import recording_rows
 from cockpit.bench_rows import percentile_rows
 from cockpit.bench_session import session_rows
+from cockpit.bench_surmount import surmount_rows
 from cockpit.desk import load_models, make_config
 
 CYCLES = 500
@@ -54,6 +55,7 @@ def run_bench(as_json: bool, seconds: float, only: str = "") -> None:
         ("collision server", collision_rows),
         ("joint images", cspace_rows),
         ("planning trajectories", plan_rows),
+        ("surmounting", surmount_rows),
         ("people", people_rows),
         ("recording", lambda: recording_rows(site, config, seconds)),
         ("a session of an hour", lambda: session_rows(site, config, seconds)),

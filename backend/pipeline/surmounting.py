@@ -36,6 +36,8 @@ from backend.stability.records import Stability
 
 RULES = TipOver()
 """How tipping over is judged where the site judges none: on an obstacle it always is."""
+DOUBT = 0.2
+"""Share of a planned clearance to what is climbed that the pose's uncertainty may use up."""
 
 
 def in_force(
@@ -74,8 +76,9 @@ def surmounting_concern(
         return surmounting.unknown(own, joints, f"{label} {reason}", now)
     climbed = standing(_parted(ByIdentity(around), given.obstacles)[1])
     limits = surmounting.limits_of(given, config.limits)
-    # The pose may be wrong by what its inflation holds beyond the configured factor.
-    doubt = state.eta - config.eta
+    # The pose may be wrong by what its inflation holds beyond the configured factor; but how it
+    # lies to what it stands on is known better than where both are.
+    doubt = min(state.eta - config.eta, DOUBT * given.clearance)
     kept = _kept(ByIdentity(machine), given.touching)
     found = closest(climbed, state.body.boxes.take(kept), limits.slow_below + doubt)
     found = replace(found, link=np.flatnonzero(kept)[found.link])
@@ -173,7 +176,7 @@ def _approach(
 ) -> Approach | None:
     """What braking is judged by: of the parts that must not touch."""
     assert state.body is not None
-    keep = limits.stop_below + spread(machine, state.pose)
+    keep = limits.stop_below + min(spread(machine, state.pose), DOUBT * given.clearance)
     reach = standing_reach(machine, keep, LONGEST_DELAY)
     boxes, names = cover(climbed, hulls(machine).around(state.body.link_poses), reach, NEAR)
     if not len(boxes):

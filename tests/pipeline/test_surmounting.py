@@ -202,6 +202,28 @@ def test_parts_that_are_not_to_touch_are_kept_off_what_is_climbed(config: Config
     assert words.line(concern, config.labels).startswith("STOP · LEFT tracks ↔ step · 0.00 m")
 
 
+def test_an_uncertain_pose_does_not_stop_what_is_as_planned(config: Config) -> None:
+    """The arm 0.05 m above the top, by plan: there it may be, however the position is known."""
+    arm = MINI.body_parts != "tracks"
+    corners = kinematics.body_boxes(MINI, kinematics.link_poses(MINI, Q, T_ROOT)).corners()[arm]
+    low = float(corners[corners[..., 0] > EDGE][:, 2].min())
+    step, wall = config.site.boxes.centers
+    half = np.array([[3.0, 3.0, 0.5 * (low - 0.05)], [0.1, 3.0, 1.0]])
+    raised = replace(
+        config.site.boxes,
+        centers=np.array([[step[0], 0.0, half[0, 2]], wall]),
+        half_extents=half,
+    )
+    higher = replace(config, site=SiteBodies(raised, config.site.names))
+    found = run(higher, touching=("tracks",), clearance=0.05)
+    assert found.machines["a"].eta - config.eta > 0.02
+    assert of(found, NAME).level is Level.SLOW
+    assert (of(found, NAME).allowed > 0.3).all()
+    close = of(run(higher, touching=("tracks",), clearance=0.2), NAME)
+    assert close.level is Level.STOP
+    assert close.evidence.other == "site:step"
+
+
 @pytest.mark.parametrize(
     ("changes", "why"),
     [
