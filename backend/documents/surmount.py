@@ -17,8 +17,8 @@ from backend.documents.surmount_document import (
     SurmountParameters,
     SurmountPhase,
 )
+from backend.documents.surmount_live import SQUARE, blocked, step_of
 from backend.documents.surmount_live import Step as Ahead
-from backend.documents.surmount_live import blocked, step_of
 from backend.documents.surmount_task import GivenParameters, SurmountTaskDocument
 from backend.errors import InputError
 from backend.fusion.crs import SiteFrame
@@ -43,8 +43,6 @@ SHOWN = 600
 """Rows of the figures at most."""
 LEVEL = math.radians(2.0)
 """A machine that leans more than this stands on no level ground [rad]."""
-SQUARE = math.radians(2.0)
-"""A machine turned farther from the way across the edge than this squares up first [rad]."""
 
 
 @dataclass(frozen=True, eq=False)
