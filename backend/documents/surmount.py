@@ -17,8 +17,8 @@ from backend.documents.surmount_document import (
     SurmountParameters,
     SurmountPhase,
 )
+from backend.documents.surmount_live import SQUARE, blocked, step_of
 from backend.documents.surmount_live import Step as Ahead
-from backend.documents.surmount_live import blocked, step_of
 from backend.documents.surmount_task import GivenParameters, SurmountTaskDocument
 from backend.errors import InputError
 from backend.fusion.crs import SiteFrame
@@ -43,8 +43,6 @@ SHOWN = 600
 """Rows of the figures at most."""
 LEVEL = math.radians(2.0)
 """A machine that leans more than this stands on no level ground [rad]."""
-SQUARE = math.radians(2.0)
-"""A machine turned farther from the way across the edge than this squares up first [rad]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -217,7 +215,8 @@ def _document(
         )
         for number, phase in zip(_legs_of(made), motion.phases, strict=True)
     ]
-    notes = []
+    notes: list[str] = []
+    figures = _figures(asked, made)
     if abs(asked.angle) > SQUARE:
         turning = _squared_up(asked, machine)
         shift = turning[0][-1] + dt
@@ -231,6 +230,10 @@ def _document(
             p.model_copy(update={"start": p.start + shift, "end": p.end + shift}) for p in phases
         ]
         phases = [first, *later]
+        # Of what was simulated, which begins when it faces the edge.
+        later_times = [round(t + float(shift), 3) for t in figures.time]
+        later_phases = [k + 1 for k in figures.phase]
+        figures = figures.model_copy(update={"time": later_times, "phase": later_phases})
         notes.append("squaring up on the spot was not simulated: what tracks do when they turn is")
         notes[-1] += " not known beforehand"
     told = T.copy()
@@ -269,7 +272,7 @@ def _document(
                 worst_torque=_share(np.abs(run.torques).max(axis=0), machine.max_torque),
                 worst_rate=_share(np.abs(run.rates).max(axis=0), machine.max_velocity),
             ),
-            "figures": _figures(asked, made),
+            "figures": figures,
             "assumptions": _assumptions(asked, made),
             "notes": notes,
         }

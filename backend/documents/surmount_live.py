@@ -26,6 +26,8 @@ from backend.spatial.types import Array, BoolArray
 
 AHEAD = math.radians(45.0)
 """A step whose edge is turned farther from the tracks than this is not ahead [rad]."""
+SQUARE = math.radians(2.0)
+"""A machine turned farther from the way across the edge than this has to square up first [rad]."""
 LEAST = 0.01
 """Lower than this over the ground is no step [m]."""
 NEARER = 0.05
@@ -89,6 +91,12 @@ def live_surmount(asked: SurmountRequest, snapshot: Snapshot, config: Config) ->
         raise InputError(f"{label} moves ({role}); a manoeuvre begins at rest.")
     T_site_root = state.body.link_poses[0]
     step = _asked_step(asked, T_site_root, config)
+    if abs(step.angle) > SQUARE:
+        side = "right" if step.angle > 0.0 else "left"
+        raise InputError(
+            f"{label} is turned by {math.degrees(abs(step.angle)):.0f} degrees from the way across "
+            f"the edge: turn it {side} to within {math.degrees(SQUARE):.0f} degrees of that."
+        )
     boxes, names, keep = around(name, step, snapshot, config)
     q = np.clip(state.pose.joints, machine.lower, machine.upper)
     return LiveSurmount(name, snapshot.time, asked, step, T_site_root, q, boxes, names, keep)

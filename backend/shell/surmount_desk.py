@@ -4,6 +4,7 @@ while on offer. Nothing here moves a machine; following one is `driving`'s.
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import math
 import multiprocessing
@@ -100,7 +101,7 @@ class SurmountDesk:
         self._line = Line(multiprocessing.get_context("spawn"))
         begin = partial(begin_search, machines, self._line, solve)
         self._searching: Aside[Search, Answer] = Aside(begin, "looks for manoeuvres", NICENESS)
-        self._watching: Aside[Look, str] = Aside(
+        self._watching: Aside[Look | None, str] = Aside(
             partial(begin_watch, machines), "watches manoeuvres"
         )
         self._lock, self._look_lock = threading.Lock(), threading.Lock()
@@ -303,6 +304,9 @@ class SurmountDesk:
             self._wake.clear()
 
     def _watch(self) -> None:
+        # While the first one is looked for: a process that begins would hold up the first look.
+        with contextlib.suppress(RuntimeError, WorkerGone), self._look_lock:
+            self._watching.ask(None)
         while not self._closing:
             self.look()
             time.sleep(WATCHED)

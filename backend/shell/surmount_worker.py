@@ -99,9 +99,11 @@ def begin_search(
     return partial(_searched, machines, line, solve)
 
 
-def begin_watch(machines: Mapping[str, Machine]) -> Callable[[Look], str]:
-    """In the process that watches: what is in the way, in words; empty if nothing."""
-    return lambda look: in_the_way(machines[look.machine], look)
+def begin_watch(machines: Mapping[str, Machine]) -> Callable[[Look | None], str]:
+    """In the process that watches: what is in the way, in words; empty if nothing. None asks for
+    nothing but that it is there.
+    """
+    return lambda look: "" if look is None else in_the_way(machines[look.machine], look)
 
 
 def in_the_way(machine: Machine, look: Look) -> str:

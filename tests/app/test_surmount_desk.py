@@ -132,6 +132,9 @@ def test_the_task_has_all_but_the_step_in_the_way() -> None:
         (scene(), asked(obstacle="wall"), 'obstacle is "wall"; allowed are post, step'),
         (scene(), asked(obstacle="post"), "post is not ahead"),
         (scene(a=state("a", (0.0, 0.0), rates=0.3)), asked(), "A moves (swing)"),
+        (scene(a=state("a", (0.0, 0.0), 0.2)), asked(), "turned by 11 degrees"),
+        (scene(a=state("a", (0.0, 0.0), 0.2)), asked(), "turn it right"),
+        (scene(a=state("a", (0.0, 0.0), -0.05)), asked(), "turn it left to within 2 degrees"),
         (scene(b=state("b", FAR, validity=Validity.STALE)), asked(), "B joints are 0.6 s old"),
     ],
 )

@@ -126,8 +126,8 @@ def test_from_the_list_to_the_top(browser: Browser, station: Backend, artifacts:
     other.click()
     climber.wait(lambda: "." in climber.offer().get("plan", ""))
     end = time.monotonic() + LONG
-    while climber.offer()["state"] == "planning":
-        assert time.monotonic() < end
+    while climber.offer()["state"] in ("planning", "unknown"):  # late, too, on a busy computer
+        assert time.monotonic() < end, climber.offer()
         time.sleep(0.3)
     assert climber.offer()["state"] == "offered", climber.offer()
     climber.accept()

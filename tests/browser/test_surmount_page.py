@@ -235,6 +235,8 @@ def no_overflow(feed: SurmountFeed, size: tuple[int, int]) -> None:
     ends = feed.page.evaluate(tops)
     assert all(a[1] <= b[0] + 0.6 for a, b in pairwise(ends)), ends
     assert feed.page.is_visible("#alarm-line")
+    wide = "(n => n.scrollWidth - n.clientWidth)(document.getElementById('so-table'))"
+    assert feed.page.evaluate(wide) <= 0
 
 
 @pytest.mark.parametrize("size", SIZES, ids=lambda s: f"{s[0]}x{s[1]}")
@@ -283,7 +285,7 @@ def test_from_the_list_to_the_top(browser: Browser, size: tuple[int, int], artif
     rows = feed.rows()
     assert [row[1] for row in rows] == ["5950", "6100", "6400", "6600"]
     assert [row[0] for row in rows] == ["▸", "", "", ""]
-    assert rows[0][2:] == ["32.0", "0.29", "29", "simulated"]
+    assert rows[0][2:] == ["32.0", "0.29", "29", "sim"]
     feed.send(lambda: bool(feed.of("plan")) and feed.of("plan")[-1]["rate"] == 1)
     assert feed.of("plan")[-1]["plan"] == PLAN
     feed.seek(HALF)

@@ -1,12 +1,13 @@
 // The site's obstacles as steps, seen from the own machine: how high, how far ahead. The server judges them once more.
 
-import { deg } from "../axis.js";
+import { deg, number } from "../axis.js";
 import { inside } from "../geometry.js";
 import { footprint } from "../plots/plan_layers.js";
 import { machine, state } from "../state.js";
 
 const LEAST = 0.01; // m, of a step
 const AHEAD = 45; // degrees, of its edge to the tracks
+const SQUARE = 2; // degrees, from which on the machine has to square up first
 
 /** "hall/1" -> "hall". */
 const whole = (name) => String(name).split("/")[0];
@@ -41,7 +42,8 @@ function step(one, m) {
     return { height: -2 * up.half, distance: edge.distance, depth: null, why: "" };
   }
   const face = found.reduce((best, one_) => (one_.along > best.along ? one_ : best));
-  const why = height < LEAST ? "not higher than the ground here" : deg(Math.acos(Math.min(1, Math.max(-1, face.along)))) > AHEAD || face.distance <= 0 ? "not ahead" : "";
+  const turned = deg(Math.acos(Math.min(1, Math.max(-1, face.along))));
+  const why = height < LEAST ? "not higher than the ground here" : turned > AHEAD || face.distance <= 0 ? "not ahead" : turned > SQUARE ? `not faced: turn ${number(turned, 0)}° to face its edge` : "";
   return { height, distance: face.distance, depth: face.depth, why };
 }
 

@@ -113,7 +113,7 @@ function table() {
     const choose = make("button", { type: "button", text: number(one.energy, one.energy >= 100 ? 0 : 1), "aria-pressed": String(one.k === now), title: `P1 ${number(one.parameters.p1, 3)}, P2 ${number(one.parameters.p2, 3)}, P3 ${number(one.parameters.p3, 3)}, P4 ${number(one.parameters.p4, 3)} m, α_F ${number(deg(one.parameters.alpha_f), 2)}°${one.simulated ? ", simulated" : ", quasi-static: a lower bound"}` });
     choose.disabled = model.planning() || model.following() || !model.mayAsk();
     choose.addEventListener("click", () => model.choose(one.k));
-    const cells = [number(one.duration, 1), number(one.min_stability_margin, 2), Number.isFinite(one.worst_torque) ? number(100 * one.worst_torque, 0) : "–", one.simulated ? "simulated" : "estimate"];
+    const cells = [number(one.duration, 1), number(one.min_stability_margin, 2), Number.isFinite(one.worst_torque) ? number(100 * one.worst_torque, 0) : "–", one.simulated ? "sim" : "est"];
     return make("tr", { "data-candidate": one.k, "data-shown": one.k === now ? 1 : 0 }, make("td", { text: one.k === now ? "▸" : "" }), make("td", {}, choose), ...cells.map((text) => make("td", { text })));
   }));
 }

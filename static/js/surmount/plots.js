@@ -1,8 +1,8 @@
 // Figs. 10-14 of Jayasekara and Arisumi 2015, live: joint angles, rates and torques with their limits, the energy, and the way of the centre of mass, with the phases as bands.
 
-import { C, size } from "../theme.js";
+import { C, font, size } from "../theme.js";
 import { deg, number, ticks } from "../axis.js";
-import { clear, fit, label, legend, segment, swatches } from "../pen.js";
+import { clear, label, legend, segment, swatches } from "../pen.js";
 import { star } from "../glyphs.js";
 import { curve, frame, points, upward } from "../plots/chart.js";
 import { INKS, at, empty, entries, needle, overTime, timeAt } from "../plots/over_time.js";
@@ -30,6 +30,7 @@ const rounded = (v, digits = 2) => Math.round(v * 10 ** digits) / 10 ** digits;
 
 /** The phases as bands, named where there is room. */
 function bands(g, { box, x }, phases) {
+  g.font = font("tick");
   phases.forEach(({ name, start, end }, k) => {
     const left = Math.max(box.left, x(start)), right = Math.min(box.right, x(end));
     if (right <= left) return;
@@ -37,7 +38,9 @@ function bands(g, { box, x }, phases) {
     g.fillRect(left, box.top, right - left, box.bottom - box.top);
     if (k) segment(g, left, box.top, left, box.bottom, C.edge, 1, [1, 3]);
     const short = name.replace(/^down /, "↓").replace(/sequence (\S+)/, (all, one) => SHORT[all] ?? one);
-    if (right - left > 1.1 * size("tick")) fit(g, [name, short], left + 3, box.top + 2, right - left - 5, { base: "top", halo: true });
+    // Half a name says nothing: hovering tells it.
+    const text = [name, short].find((one) => g.measureText(one).width <= right - left - 5);
+    if (text) label(g, text, left + 3, box.top + 2, { base: "top", halo: true });
   });
 }
 
@@ -95,7 +98,9 @@ function lines(g, width, height, kind) {
   drawn.forEach((limit, j) => {
     if (!Number.isFinite(limit)) return;
     segment(g, chart.box.left, chart.y(limit), chart.box.right, chart.y(limit), C.slow, 1.5, [2, 2]);
-    label(g, `${roles[j]} limit`, chart.box.right - 3, chart.y(limit) + 2, { align: "right", base: "top", halo: true });
+    // Below the names of the phases where the limit is as far up as these.
+    const below = Math.max(chart.y(limit) + 2, chart.box.top + 1.4 * size("tick"));
+    label(g, `${roles[j]} limit`, chart.box.right - 3, below, { align: "right", base: "top", halo: true });
   });
   was.forEach((values) => values.length && curve(g, chart, points(chart, actual.at, values), C.remote, 3));
   curves.forEach((values, j) => curve(g, chart, points(chart, figures.time, values), INKS[j % 6], 2, DASHES[j % 6]));
@@ -145,7 +150,7 @@ function com(g, width, height) {
   const wide = Math.max(to - from, 0.1);
   const marks = ticks(from - 0.05 * wide, to + 0.05 * wide, Math.max(2, width / (4 * t)), [0.02, 0.05, 0.1, 0.2, 0.5, 1, 2]);
   const digits = marks.length > 1 && marks[1] - marks[0] < 0.095 ? 2 : 1;
-  const chart = (charts.com = frame(g, { left: 2, right: width - 2, height: height - 1.15 * t - 2 }, { from: from - 0.05 * wide, to: to + 0.05 * wide, marks: marks.map((v) => [v, number(v, digits)]) }, upward(Math.min(...up), Math.max(...up), height < 150 ? 3 : 5), "CoM height, m", "m", 2.4));
+  const chart = (charts.com = frame(g, { left: 2, right: width - 2, height: height - 1.15 * t - 2 }, { from: from - 0.05 * wide, to: to + 0.05 * wide, marks: marks.map((v) => [v, number(v, digits)]) }, upward(Math.min(...up), Math.max(...up), height < 150 ? 3 : 5), "CoM: along →, height ↑, m", "m", 2.4));
   const pixels = figures.com.map(([a, b]) => [chart.x(a), chart.y(b)]);
   // Each phase in its own dash, with its short name where it begins.
   document.phases.forEach(({ name, start, end }, k) => {
@@ -157,7 +162,6 @@ function com(g, width, height) {
   });
   const now = at(figures.time, pixels, model.moment());
   star(g, now[0], now[1], false, 8);
-  label(g, "along, m →", chart.box.right - 4, chart.box.bottom - 3, { align: "right", base: "bottom", halo: true });
   legend(g, 4, height - 0.6 * t, width - 6, [[swatches.line("#FFFFFF"), "sequences"], [swatches.line(C.second, [2, 3], 1.5), "moves"], [swatches.glyph((c, x, y) => star(c, x, y, false, 6)), "now"]], 6);
   const value = at(figures.time, figures.com, model.moment());
   return { state: told("com", { com: value.map((v) => rounded(v, 3)), rise: rounded(up[up.length - 1] - up[0], 3) }), age: 0, label: `Centre of mass: ${number(value[0], 2)} m along, ${number(value[1], 2)} m up` };

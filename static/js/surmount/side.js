@@ -94,7 +94,7 @@ function paint(g, width, tall) {
     const list = ticks(from[n], to[n], most, [0.1, 0.2, 0.5, 1, 2, 5, 10]);
     return { from: from[n], to: to[n], marks: list.map((v) => [v, number(v, list.length > 1 && list[1] - list[0] < 0.99 ? 1 : 0)]) };
   };
-  chart = frame(g, { left: 2, right: width - 2, height: bottom }, axis(0, Math.max(2, width / (4 * t))), axis(1, 5), "height, m", "m", 2.2);
+  chart = frame(g, { left: 2, right: width - 2, height: bottom }, axis(0, Math.max(2, width / (4 * t))), axis(1, 5), "along →, height ↑, m", "m", 2.2);
   const { box, x, y } = chart;
   g.save();
   g.beginPath();
@@ -131,8 +131,7 @@ function paint(g, width, tall) {
     fill(g, chart, now.tracks, rgba(C.second, 0.5));
     ring(g, x(now.tip[0]), y(now.tip[1]), 4);
   }
-  if (step) label(g, `${metres(Math.abs(step.height))} ${step.height < 0 ? "down" : "high"}`, Math.min(x(step.distance) + 4, box.right - 4), y(Math.max(step.height, 0)) - 3, { halo: true, align: x(step.distance) + 60 > box.right ? "right" : "left" });
-  label(g, "along, m →", box.right - 4, box.bottom - 3, { align: "right", base: "bottom", halo: true });
+  if (step) label(g, `step ${metres(Math.abs(step.height))} ${step.height < 0 ? "down" : "up"}`, box.left + 4, box.top + 2, { base: "top", halo: true });
   const swatch = (draw) => swatches.glyph(draw);
   legend(g, 4, tall - 0.6 * t, width - 6, [...(side ? [[swatch((c, px_, py) => star(c, px_, py, false, 6)), "CoM"]] : []), [swatch((c, px_, py) => ring(c, px_, py, 4)), side ? "bucket pivot" : "end point"], [swatches.line(C.site, null, 2), "ground"]], 6);
   return {
