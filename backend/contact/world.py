@@ -10,11 +10,15 @@ Units SI; the world's frame is any with z up; joints in the order of `Machine.jo
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-import mujoco
 import numpy as np
+
+# Nothing is drawn with it: without this, importing it looks for windows, in a process of its own.
+os.environ.setdefault("MUJOCO_GL", "disable")
+import mujoco
 
 from backend.contact.crawler import Crawler, crawler_of
 from backend.contact.outfit import edge_half_width, edge_radius

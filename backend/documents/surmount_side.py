@@ -14,7 +14,7 @@ from backend.machine.outline_kernel import convex_hull
 from backend.spatial.rotation import from_attitude, to_attitude
 from backend.spatial.types import Array
 
-MOST = 240
+MOST = 400
 """Moments that are drawn."""
 MOVED = 0.05
 """A base that moves less than this [m] shows no way: then its heading does."""
