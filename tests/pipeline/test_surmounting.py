@@ -25,6 +25,7 @@ from backend.safety.partner import Limits
 from backend.safety.record import Level
 from backend.safety.surmounting import NAME, Surmounting
 from backend.safety.tip_over import TipOver
+from backend.shell.app.models import SnapshotModel
 from backend.shell.app.wire import dumps
 from backend.shell.session.recorded_snapshot import recorded_snapshot
 from backend.shell.session.surmounting_message import surmounting_of
@@ -287,6 +288,9 @@ def test_it_comes_back_from_recordings_bit_by_bit(config: Config) -> None:
         with pytest.raises((KeyError, ValueError, TypeError)):
             surmounting_of({k: v for k, v in asdict(told).items() if k != field})
     snapshot = run(config)
+    document = json.loads(dumps(snapshot_document(snapshot, config)))
+    shown = SnapshotModel.model_validate(document).surmounting["a"]
+    assert shown.model_dump() == document["surmounting"]["a"]
     again = recorded_snapshot(json.loads(dumps(snapshot_document(snapshot, config))), config)
     assert again.surmounting == snapshot.surmounting
     assert [c.reason for c in again.concerns] == [c.reason for c in snapshot.concerns]

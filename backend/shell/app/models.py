@@ -178,6 +178,22 @@ class GaugeStampModel(BaseModel):
     )
 
 
+class SurmountingModel(BaseModel):
+    """What a manoeuvre that is followed counts on. Site frame [m], angles [rad]."""
+
+    plan: str
+    time: float = Field(description="when it was told, local monotonic clock [s]")
+    obstacles: list[str] = Field(description="of the site, that are climbed")
+    phase: str
+    touching: list[str] = Field(description="parts of the machine that touch them by plan")
+    position: list[float] = Field(description="of the base, where it should be seen")
+    attitude: list[float] = Field(description="its yaw, pitch and roll there")
+    tolerance: list[float] = Field(description="of both")
+    support: list[list[float]] = Field(description="points that bear the machine")
+    margin: float = Field(description="of the centre of mass to the edge of these, by plan")
+    clearance: float = Field(description="of all other parts to what is climbed, the least by plan")
+
+
 class SnapshotModel(BaseModel):
     """One cycle's conclusions."""
 
@@ -199,6 +215,9 @@ class SnapshotModel(BaseModel):
     people: PeopleModel | None = Field(None, description="null where the site has no LiDAR")
     stability: dict[str, StabilityModel] = Field(
         default_factory=dict, description="by machine; empty where tipping over is not judged"
+    )
+    surmounting: dict[str, SurmountingModel] = Field(
+        default_factory=dict, description="by machine, while it is climbing by plan"
     )
     images: dict[str, ImageStampModel] = Field(description="newest image by kind and pair")
     health: HealthCountersModel
