@@ -467,3 +467,21 @@ def test_one_panel_stands_in_its_place_and_elsewhere_is_no_button(browser: Brows
     super(SurmountFeed, feed).send(lambda: feed.page.is_hidden("#surmount"))
     assert feed.errors == []
     feed.page.close()
+
+
+@pytest.mark.parametrize("size", SIZES, ids=lambda s: f"{s[0]}x{s[1]}")
+def test_one_button_more_takes_no_name_from_the_plans_header(
+    browser: Browser, size: tuple[int, int], artifacts: Path
+) -> None:
+    feed = SurmountFeed(browser, size)
+    feed.open()
+    feed.page.evaluate("() => { document.getElementById('gauge-open').hidden = false; }")
+    told = """([text, kind]) => { const age = document.querySelector("#plan-panel .age");
+      age.textContent = text; age.className = `age ${kind}`;
+      const parts = [...document.querySelectorAll("#plan-panel > header *")];
+      return parts.filter(n => n.checkVisibility() && n.clientWidth > 0
+        && n.scrollWidth > n.clientWidth + 1).map(n => n.id || n.textContent); }"""
+    for text, kind in (("0.2 s", ""), ("0.6 s", "old"), ("STALE 1.4 s", "stale")):
+        assert feed.page.evaluate(told, [text, kind]) == []
+    feed.page.screenshot(path=artifacts / f"surmount-header-{size[0]}x{size[1]}.png")
+    feed.page.close()
