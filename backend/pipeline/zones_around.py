@@ -30,8 +30,8 @@ from backend.pipeline.config import Config
 from backend.pipeline.people import everybody
 from backend.pipeline.place import base_transform
 from backend.pipeline.records import Snapshot
-from backend.pipeline.surroundings import PEOPLE, SITE
 from backend.pipeline.stood_on import but_ground
+from backend.pipeline.surroundings import PEOPLE, SITE
 from backend.pipeline.working_gauge import site_of
 from backend.pipeline.zones import TOLERANCE, ZoneImage, set_upright
 from backend.site.named_bodies import SiteBodies
