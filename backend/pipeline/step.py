@@ -42,6 +42,7 @@ from backend.pipeline.site_concern import site_concern
 from backend.pipeline.stability import Standing, standing
 from backend.pipeline.stability import concerns as tip_overs
 from backend.pipeline.stability import following as standing_after
+from backend.pipeline.stood_on import but_ground
 from backend.pipeline.working_area import area_of, inside
 from backend.pipeline.working_gauge import following as gauge_now
 from backend.pipeline.working_gauge import site_of
@@ -107,6 +108,7 @@ def step(state: State, inputs: Inputs, now: float, config: Config) -> tuple[Stat
     climbing = surmounting.in_force(inputs.surmounting, machines, now)
     for name in config.own:
         around = surmounting.without(site_of(name, gauge, config), climbing.get(name))
+        around = but_ground(around, machines[name])
         if len(around.boxes):
             driven_here = name in driven
             concerns += (site_concern(name, machines[name], now, config, driven_here, around),)

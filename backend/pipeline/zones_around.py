@@ -30,6 +30,7 @@ from backend.pipeline.config import Config
 from backend.pipeline.people import everybody
 from backend.pipeline.place import base_transform
 from backend.pipeline.records import Snapshot
+from backend.pipeline.stood_on import but_ground
 from backend.pipeline.surroundings import PEOPLE, SITE
 from backend.pipeline.working_gauge import site_of
 from backend.pipeline.zones import TOLERANCE, ZoneImage, set_upright
@@ -99,7 +100,8 @@ def site_zone(snapshot: Snapshot, config: Config, own: str) -> ZoneImage:
     machine, state = config.machines[own], snapshot.machines[own]
     if state.body is None:
         raise ValueError(f"{own} is not placed yet")
-    pose, site = state.pose, site_of(own, snapshot.gauge, config)
+    pose = state.pose
+    site = but_ground(site_of(own, snapshot.gauge, config), state)
     cell = (round(float(pose.position[0]) / CELL), round(float(pose.position[1]) / CELL))
     height = round(float(pose.position[2]) / HEIGHT)
     turn = tuple(round(float(v) / ANGLE) for v in (pose.yaw, pose.pitch, pose.roll))

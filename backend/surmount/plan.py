@@ -32,7 +32,7 @@ Open = Callable[[Climber, Step], AbstractContextManager[Simulate]]
 
 TRIED = 12
 """Of the quick search that are simulated."""
-VERIFIED = 5
+VERIFIED = 12
 """Whole manoeuvres that are gone through at most before a leg is given up."""
 OFFERED = 6
 """Candidates that are told."""
