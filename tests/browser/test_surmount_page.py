@@ -446,6 +446,8 @@ def test_why_not_is_said_in_words(browser: Browser) -> None:
     feed.follow(ended="14 degrees off; plan again")
     feed.until_state("ENDED")
     assert "Ended: 14 degrees off; plan again" in feed.words()
+    assert "Accept takes it up where it was left" in feed.words()
+    assert feed.page.is_enabled("#so-accept")
     feed.page.click("#so-drop")
     feed.send(lambda: feed.offers == {} and feed.of("follow")[-1]["do"] == "drop")
     feed.page.keyboard.press("Escape")

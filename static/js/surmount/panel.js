@@ -83,7 +83,7 @@ function lines() {
     const [where, what] = followLines(follow);
     return [`${model.phase(follow.at)?.name ?? ""} · ${where}`, what];
   }
-  if (follow?.ended && !follow.arrived && follow.plan === offer?.plan) return [`Ended: ${named(follow.ended)}`];
+  if (follow?.ended && !follow.arrived && follow.plan === offer?.plan) return [`Ended: ${named(follow.ended)}`, offer?.state === "offered" ? "Accept takes it up where it was left" : "Find a way again"];
   if (offer?.progress) return [offer.progress.of ? `${offer.progress.words} ${offer.progress.done} of ${offer.progress.of}` : offer.progress.words || "starting", "Nothing moves by it"];
   if (model.planning()) return ["waits for its turn", "Nothing moves by it"];
   const step = chosen();
