@@ -309,7 +309,7 @@ def _candidate(found: Found, made: Plan) -> SurmountCandidate:
     return one.model_copy(
         update={
             "duration": sum(s.duration for s in sequences),
-            "min_stability_margin": leg.made.margin if chosen else margin,
+            "min_stability_margin": margin,
             "worst_torque": 1.0 - verdict.left["torque"],
         }
     )

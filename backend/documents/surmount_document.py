@@ -45,8 +45,10 @@ class SurmountCandidate(BaseModel):
 
     parameters: SurmountParameters
     energy: float | None = Field(None, description="(19) [J]")
-    duration: float | None = Field(None, description="[s]")
-    min_stability_margin: float | None = Field(None, description="[m]")
+    duration: float | None = Field(None, description="of the three sequences [s]")
+    min_stability_margin: float | None = Field(
+        None, description="of the three sequences; checks tell that of all [m]"
+    )
     worst_torque: float | None = Field(None, description="share of the joint's own")
     simulated: bool = Field(False, description="else quasi-static")
     chosen: bool = False

@@ -13,6 +13,7 @@ from backend.machine.model import Machine
 from backend.pipeline.config import Config
 from backend.pipeline.records import MachineMargins, Snapshot
 from backend.pipeline.static_layers import self_not_free, site_not_free
+from backend.pipeline.stood_on import but_ground
 from backend.pipeline.surroundings import PARTNER, growth, surroundings_of
 from backend.pipeline.tipping import may_tip, resting_now
 from backend.pipeline.working_gauge import site_of
@@ -56,7 +57,7 @@ def regions_image(
     partners = surroundings_of(own, snapshot.machines, config).layers[PARTNER]
     grid = joint_grid(machine, shape)
     taken = blocked(arm_model(machine, pose.joints, eta), grid, partners, OUTER)
-    around = site_of(own, snapshot.gauge, config)
+    around = but_ground(site_of(own, snapshot.gauge, config), snapshot.machines[own])
     taken |= site_not_free(machine, pose, around, eta, shape)
     taken |= self_not_free(machine, pose.joints, slack, shape)
     free = ~unpacked(taken, shape[3])

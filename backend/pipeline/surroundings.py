@@ -19,6 +19,7 @@ from backend.pipeline.records import (
     MachineState,
     PairDistance,
 )
+from backend.pipeline.stood_on import but_ground
 from backend.pipeline.working_gauge import site_of
 from backend.site.named_bodies import SiteBodies
 from backend.spatial import transform
@@ -84,7 +85,8 @@ def surroundings_of(
         if name != own and state.body is not None
     }
     somebody = (NO_BOXES, ()) if people is None else everybody(people)
-    return surroundings(config.machines[own], body, others, site_of(own, gauge, config), somebody)
+    site = but_ground(site_of(own, gauge, config), machines[own])
+    return surroundings(config.machines[own], body, others, site, somebody)
 
 
 def growth(own: str, machines: Mapping[str, MachineState], config: Config) -> float:
