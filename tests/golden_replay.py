@@ -17,11 +17,17 @@ from backend.shell.session.evaluate import evaluate
 from backend.shell.session.reader import open_session
 from backend.site.site import load_site
 from cockpit.desk import load_models, make_config
+from cockpit.playback import recorded_site
 
 ROOT = Path(__file__).resolve().parents[1]
 SESSIONS = ROOT / "scenes" / "sessions"
 GOLDEN = ROOT / "tests" / "golden"
-SITES = {"near-miss": "demo", "sun2020-experiment": "sun2020-experiment", "ballast": "ballast"}
+SITES: dict[str, str | None] = {
+    "near-miss": "demo",
+    "sun2020-experiment": "sun2020-experiment",
+    "ballast": "ballast",
+    "step": None,  # as it stands in the session, without RIGHT
+}
 
 DISTANCE, ANGLE = 1e-5, 1e-6
 """Tolerances [m], [rad]: rounding of another processor's arithmetic, nothing that is seen."""
@@ -29,9 +35,11 @@ DISTANCE, ANGLE = 1e-5, 1e-6
 
 def summary(name: str) -> dict[str, Any]:
     """The whole session, every cycle evaluated."""
-    site = load_site(SITES[name])
+    parts = SESSIONS / name
+    session = open_session(parts if parts.is_dir() else SESSIONS / f"{name}.mcap")
+    chosen = SITES[name]
+    site = recorded_site(session) if chosen is None else load_site(chosen)
     config = make_config(site, load_models(site), (), "PLAYBACK")
-    session = open_session(SESSIONS / f"{name}.mcap")
     moments = [
         ((portion.time - session.begin) / 1e9, snapshot)
         for portion, snapshot in evaluate(session, Topics.of(site), config)
