@@ -10,7 +10,8 @@ from typing import Literal
 
 import numpy as np
 
-from backend.contact.world import ContactWorld, Options
+from backend.contact.spec import Options
+from backend.contact.world import ContactWorld
 from backend.errors import InputError
 from backend.machine.model import Machine
 from backend.spatial.boxes import Boxes

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from backend.contact.world import STEP, ContactWorld, Options
+from backend.contact.spec import STEP, Options
+from backend.contact.world import ContactWorld
 from backend.spatial import rotation
 from backend.spatial.boxes import Boxes
 from backend.spatial.types import Array

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from backend.contact.crawler import crawler_of
-from backend.contact.world import ContactWorld, Options
+from backend.contact.spec import Options
+from backend.contact.world import ContactWorld
 from backend.errors import InputError
 from backend.machine.load import load_machine
 from backend.spatial.boxes import Boxes

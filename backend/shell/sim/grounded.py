@@ -15,7 +15,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from backend.contact.world import ContactWorld, Options
+from backend.contact.spec import Options
+from backend.contact.world import ContactWorld
 from backend.machine.model import Machine
 from backend.shell.sim.dynamics import SimState
 from backend.spatial import rotation, transform
