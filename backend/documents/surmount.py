@@ -9,17 +9,25 @@ import numpy as np
 
 from backend.documents.scene import make_scene
 from backend.documents.surmount_document import (
-    SurmountCandidate,
     SurmountChecks,
     SurmountDocument,
-    SurmountFigures,
     SurmountObstacle,
-    SurmountParameters,
     SurmountPhase,
 )
 from backend.documents.surmount_live import SQUARE, blocked, step_of
 from backend.documents.surmount_live import Step as Ahead
+from backend.documents.surmount_side import base_poses
 from backend.documents.surmount_task import GivenParameters, SurmountTaskDocument
+from backend.documents.surmount_told import (
+    assumptions,
+    between,
+    candidate,
+    figures_of,
+    legs_of,
+    margin_of,
+    parameters_of,
+    share,
+)
 from backend.errors import InputError
 from backend.fusion.crs import SiteFrame
 from backend.machine.kinematics import end_point
@@ -28,19 +36,15 @@ from backend.site.named_bodies import NO_SITE_BODIES, SiteBodies
 from backend.spatial import rotation
 from backend.spatial.boxes import concatenated
 from backend.spatial.types import Array
-from backend.stability.dynamics import centre_of_mass
 from backend.surmount.course import Edge
-from backend.surmount.judge import judge
 from backend.surmount.laws import smooth_step
 from backend.surmount.machine import climber
 from backend.surmount.plan import Effort, Open, Plan, Refusal, demands_of, plan
 from backend.surmount.records import Demands, Parameters
-from backend.surmount.search import Found, Told
+from backend.surmount.search import Told
 
 ROWS = 0.05
 """Between two rows of a document [s]."""
-SHOWN = 600
-"""Rows of the figures at most."""
 LEVEL = math.radians(2.0)
 """A machine that leans more than this stands on no level ground [rad]."""
 
@@ -126,7 +130,7 @@ def surmount_document(
     boxes, names = boxes.take(left), tuple(n for n, on in zip(names, left, strict=True) if on)
     base = np.array(made.base)
     base[:, :3] -= scene.origin
-    poses = poses_of(base)
+    poses = base_poses(base)
     keep = asked.demands.clearance + scene.eta(task.machine)
     hit = blocked(machine, np.array(made.joints), poses, boxes, names, keep, {})
     if hit is not None:
@@ -210,13 +214,13 @@ def _document(
             name=phase.name,
             start=phase.start,
             end=phase.end,
-            energy=_between(motion.time, run.energy, phase.start, phase.end),
-            min_stability_margin=_margin(made, phase.name, number),
+            energy=between(motion.time, run.energy, phase.start, phase.end),
+            min_stability_margin=margin_of(made, phase.name, number),
         )
-        for number, phase in zip(_legs_of(made), motion.phases, strict=True)
+        for number, phase in zip(legs_of(made), motion.phases, strict=True)
     ]
     notes: list[str] = []
-    figures = _figures(asked, made)
+    figures = figures_of(machine, made)
     if abs(asked.angle) > SQUARE:
         turning = _squared_up(asked, machine)
         shift = turning[0][-1] + dt
@@ -263,113 +267,20 @@ def _document(
             "energy_quasi_static": sum(one.made.verdict.energy for one in made.legs),
             "energy_potential": sum(s.potential for one in made.legs for s in one.made.sequences),
             "parameters": parameters_of(leg.found),
-            "candidates": [_candidate(one, made) for one in leg.candidates],
+            "candidates": [candidate(one, made) for one in leg.candidates],
             "checks": SurmountChecks(
                 min_clearance=min([*cleared, *(m.clearance for m in moves)]),
                 min_stability_margin=min(one.made.margin for one in made.legs),
                 max_penetration=run.deepest,
                 max_slip=run.slip,
-                worst_torque=_share(np.abs(run.torques).max(axis=0), machine.max_torque),
-                worst_rate=_share(np.abs(run.rates).max(axis=0), machine.max_velocity),
+                worst_torque=share(np.abs(run.torques).max(axis=0), machine.max_torque),
+                worst_rate=share(np.abs(run.rates).max(axis=0), machine.max_velocity),
             ),
             "figures": figures,
-            "assumptions": _assumptions(asked, made),
+            "assumptions": assumptions(machine, made),
             "notes": notes,
         }
     )
-
-
-def parameters_of(found: Found) -> SurmountParameters:
-    """As they are told."""
-    p = found.parameters
-    return SurmountParameters(p1=p.p1, p2=p.p2, p3=p.p3, p4=p.p4, alpha_f=p.alpha_f)
-
-
-def poses_of(base: Array) -> Array:
-    """(m, 4, 4) of rows x, y, z, yaw, pitch, roll (m, 6) [m, rad]."""
-    T = np.tile(np.eye(4), (len(base), 1, 1))
-    T[:, :3, :3] = rotation.from_attitude(base[:, 3], base[:, 4], base[:, 5])
-    T[:, :3, 3] = base[:, :3]
-    return T
-
-
-def _candidate(found: Found, made: Plan) -> SurmountCandidate:
-    leg = made.legs[0]
-    chosen = found is leg.found
-    one = SurmountCandidate(
-        parameters=parameters_of(found),
-        energy=found.energy,
-        simulated=found.by != "quasi-static batch",
-        chosen=chosen,
-    )
-    verdict, sequences = judge(leg.climber, leg.leg.step, found.parameters, found.spline)
-    if not sequences:
-        return one
-    margin = min(float(s.margin.min()) for s in sequences)
-    return one.model_copy(
-        update={
-            "duration": sum(s.duration for s in sequences),
-            "min_stability_margin": margin,
-            "worst_torque": 1.0 - verdict.left["torque"],
-        }
-    )
-
-
-def _figures(asked: Asked, made: Plan) -> SurmountFigures:
-    motion, run, machine = made.motion, made.run, asked.machine
-    picked = np.unique(np.linspace(0, len(motion.time) - 1, SHOWN).round().astype(int))
-    T, q = run.T_step_root[picked], run.q[picked]
-    centre = centre_of_mass(made.climber.masses, q)
-    placed = np.einsum("mij,mj->mi", T[:, :3, :3], centre) + T[:, :3, 3]
-    return SurmountFigures(
-        time=np.round(motion.time[picked], 3).tolist(),
-        joints=np.round(q, 5).tolist(),
-        rates=np.round(run.rates[picked], 5).tolist(),
-        torques=[[float(f"{v:.5g}") for v in row] for row in run.torques[picked]],
-        torque_limits=[float(v) if np.isfinite(v) else None for v in machine.max_torque],
-        energy=[float(f"{v:.6g}") for v in run.energy[picked]],
-        com=np.round(placed[:, [0, 2]], 4).tolist(),
-        phase=motion.phase_index()[picked].tolist(),
-    )
-
-
-def _assumptions(asked: Asked, made: Plan) -> list[str]:
-    up = made.climber
-    told = [
-        *asked.machine.assumptions,
-        f"the crawler's ends are round, {up.r:.3f} m in radius, {2.0 * up.a:.3f} m apart",
-        f"the bucket holds on to the ground by a round edge of {1e3 * up.edge[0]:.0f} mm radius",
-        f"friction of tracks and bucket is {asked.demands.friction:g}; ground and step are hard",
-        "drives are ideal: losses of hydraulics and friction in joints are not counted",
-    ]
-    if not np.isfinite(asked.machine.max_torque[1:4]).all():
-        told.append("torques are not limited: the machine's description states none")
-    return told
-
-
-def _legs_of(made: Plan) -> list[int]:
-    """Which leg each phase belongs to."""
-    numbers, at = [], 0
-    for phase in made.motion.phases:
-        numbers.append(at)
-        if phase.name in ("stow", "down reach"):
-            at = min(at + 1, len(made.legs) - 1)
-    return numbers
-
-
-def _margin(made: Plan, name: str, number: int) -> float | None:
-    found = made.legs[number].made.margins.get(name.removeprefix("down "))
-    return found if found is None or math.isfinite(found) else None
-
-
-def _between(time: Array, energy: Array, start: float, end: float) -> float:
-    first, last = np.interp([start, end], time, energy)
-    return float(last - first)
-
-
-def _share(values: Array, limits: Array) -> float | None:
-    share = float((values / limits).max())
-    return share if math.isfinite(share) and share > 0.0 else None
 
 
 def _squared_up(asked: Asked, machine: Machine) -> tuple[Array, Array, Array]:

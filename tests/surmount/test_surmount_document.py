@@ -13,8 +13,8 @@ import pytest
 from surmounting import STEPS
 from typer.testing import CliRunner
 
-from backend.documents.surmount import poses_of
 from backend.documents.surmount_document import SurmountDocument
+from backend.documents.surmount_side import base_poses
 from backend.machine.kinematics import end_point
 from backend.machine.load import load_machine
 from cockpit.cli import app
@@ -68,7 +68,7 @@ def test_the_document_of_the_shovel(tmp_path: Path) -> None:
     assert any("assumed" in one for one in made["assumptions"])
     # Rows agree with each other: positions are those of the base, and rates those of the joints.
     machine = load_machine("shovel")
-    T, q = poses_of(np.array(made["base"])), np.array(made["joints"])
+    T, q = base_poses(np.array(made["base"])), np.array(made["joints"])
     assert np.abs(end_point(machine, q, T) - made["end_point"]).max() < 1e-6
     way = np.array(made["base"])[:, :2] - [10.0, 20.0]
     across = way @ [-math.sin(0.5), math.cos(0.5)]
