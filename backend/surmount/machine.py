@@ -110,18 +110,3 @@ def climber(machine: Machine, demands: Demands) -> Climber:
         mass_model(machine, demands.payload),
         (edge_radius(machine), edge_half_width(machine)),
     )
-
-
-def lowest(machine: Machine, attitude: float) -> float:
-    """How far the bucket's bodies reach below its edge when it stands on that, with its line from
-    pivot to edge `attitude` [rad] above the horizontal [m]; 0 or less where only the edge touches.
-    """
-    last = [k for k, link in enumerate(machine.body_links) if link == machine.end_link]
-    corners = machine.body_corners[last].reshape(-1, 3)
-    # In the bucket link's frame: the direction from pivot to edge, and the joint's axis.
-    along = machine.end_point / np.linalg.norm(machine.end_point)
-    axis = machine.joint_axes[3]
-    raise_ = np.cross(-machine.sun.signs[2] * axis, along) * -1.0
-    up = np.sin(attitude) * along + np.cos(attitude) * raise_
-    heights = (corners - machine.end_point) @ up
-    return float(-heights.min()) if len(heights) else 0.0

@@ -11,7 +11,7 @@ from backend.spatial.types import Array
 from backend.surmount.judge import Sequence, judge
 from backend.surmount.machine import Climber
 from backend.surmount.moves import Move, move, on_edge, on_ground, timed
-from backend.surmount.records import Motion, Parameters, Phase, Spline, Step, Verdict
+from backend.surmount.records import MOVES, Motion, Parameters, Phase, Spline, Step, Verdict
 from backend.surmount.run import fine
 
 
@@ -68,11 +68,10 @@ def manoeuvre(
         move(climber, step, stances[2], back[1][-1], None, (True, False), own),
     ]
     margins = {s.name: float(s.margin.min()) for s in sequences}
-    names = ("reach", "turn", "stow")
-    for name, made in zip(names, moves, strict=True):
+    for name, made in zip(MOVES, moves, strict=True):
         if made is not None:
             margins[name] = made.margin
-    for name, made in zip(names, moves, strict=True):
+    for name, made in zip(MOVES, moves, strict=True):
         if made is not None and made.why:
             kind = "stability" if "tipping" in made.why else "collision"
             kept = tuple(x for x in moves if x is not None)

@@ -23,7 +23,7 @@ from backend.surmount.machine import Climber, climber
 from backend.surmount.manoeuvre import Manoeuvre, joined, manoeuvre
 from backend.surmount.moves import carried, move, on_ground, timed
 from backend.surmount.outline import leans
-from backend.surmount.records import SEQUENCES, Demands, Motion, Parameters, Step
+from backend.surmount.records import Demands, Motion, Parameters, Step
 from backend.surmount.run import WIDE, Run, options_of, run
 from backend.surmount.search import Found, Job, Search, Simulate, Told
 
@@ -292,6 +292,3 @@ def _fold(
         return Refusal("collision", f"fold: {fold.why}")
     motion = timed(up, stance, "fold", fold, (None, None), dt)
     return shifted(turned(motion), leg.x, leg.z)
-
-
-SEQUENCE_NAMES = (*SEQUENCES, *(f"down {name}" for name in SEQUENCES))
