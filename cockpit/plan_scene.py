@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from backend.documents.plan_document import PlanDocument
@@ -13,26 +15,36 @@ from cockpit.views.use_case_nodes import Played
 TITLE = "PLAN · preview"
 
 
-class PlanScene:
-    """Looks plans up by their names, and keeps what was made of each machine's newest. Used from
-    any thread.
+class Newest:
+    """Keeps what was made of each machine's newest. Used from any thread.
+
+    look: what is played of a machine's plan, None where there is none of that name.
     """
 
-    def __init__(self, desk: PlanDesk) -> None:
-        self._desk = desk
+    def __init__(self, look: Callable[[str, str], Played | None]) -> None:
+        self._look = look
         self._made: dict[str, tuple[str, Played]] = {}
 
     def played(self, machine: str, plan: str) -> Played | None:
-        """None where there is no trajectory of that name."""
+        """None where there is none of that name."""
         kept = self._made.get(machine)
         if kept is not None and kept[0] == plan:
             return kept[1]
-        way = self._desk.way(machine, plan)
-        if way is None:
-            return None
-        played = as_played(*way)
-        self._made[machine] = plan, played
-        return played
+        found = self._look(machine, plan)
+        if found is not None:
+            self._made[machine] = plan, found
+        return found
+
+
+class PlanScene(Newest):
+    """Looks plans up by their names."""
+
+    def __init__(self, desk: PlanDesk) -> None:
+        def look(machine: str, plan: str) -> Played | None:
+            way = desk.way(machine, plan)
+            return None if way is None else as_played(*way)
+
+        super().__init__(look)
 
 
 def as_played(document: PlanDocument, T_site_root: Array) -> Played:

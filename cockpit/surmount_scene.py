@@ -9,7 +9,7 @@ import numpy as np
 
 from backend.shell.surmount_desk import Way
 from backend.spatial import transform
-from cockpit.plan_scene import PlanScene
+from cockpit.plan_scene import Newest, PlanScene
 from cockpit.views.use_case_nodes import Played
 
 TITLE = "OVER · preview"
@@ -23,26 +23,15 @@ class Ways(Protocol):
         ...
 
 
-class SurmountScene:
-    """Looks manoeuvres up by their names, and keeps what was made of each machine's newest. Used
-    from any thread.
-    """
+class SurmountScene(Newest):
+    """Looks manoeuvres up by their names."""
 
     def __init__(self, desk: Ways) -> None:
-        self._desk = desk
-        self._made: dict[str, tuple[str, Played]] = {}
+        def look(machine: str, plan: str) -> Played | None:
+            way = desk.way(machine, plan)
+            return None if way is None else as_played(way)
 
-    def played(self, machine: str, plan: str) -> Played | None:
-        """None where there is no manoeuvre of that name."""
-        kept = self._made.get(machine)
-        if kept is not None and kept[0] == plan:
-            return kept[1]
-        way = self._desk.way(machine, plan)
-        if way is None:
-            return None
-        played = as_played(way)
-        self._made[machine] = plan, played
-        return played
+        super().__init__(look)
 
 
 def as_played(way: Way) -> Played:

@@ -36,7 +36,7 @@ from backend.site.named_bodies import NO_SITE_BODIES, SiteBodies
 from backend.spatial import rotation
 from backend.spatial.boxes import concatenated
 from backend.spatial.types import Array
-from backend.surmount.course import Edge
+from backend.surmount.course import Edge, legs
 from backend.surmount.laws import smooth_step
 from backend.surmount.machine import climber
 from backend.surmount.plan import Effort, Open, Plan, Refusal, demands_of, plan
@@ -101,6 +101,7 @@ def surmount_document(
     else:
         distance = task.edges[0].distance + climber(machine, _demands(task, machine)).crawler.middle
         edges = tuple(Edge(e.distance - task.edges[0].distance, e.rise) for e in task.edges)
+        _follow_each_other(edges, where)
         depth = edges[1].x if len(edges) > 1 else math.inf
     given = None if task.parameters is None else _given(task.parameters)
     asked = Asked(
@@ -139,6 +140,13 @@ def surmount_document(
             ok=False, why=why, kind="collision", machine=task.machine, obstacle=made.obstacle
         )
     return made
+
+
+def _follow_each_other(edges: tuple[Edge, ...], where: str) -> None:
+    try:
+        legs(edges)
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from error
 
 
 def edges_of(ahead: Ahead, over: bool) -> tuple[Edge, ...]:

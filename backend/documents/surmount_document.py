@@ -35,7 +35,7 @@ class SurmountObstacle(BaseModel):
 
     name: str = Field(description="of the site's box, empty where it was given by numbers")
     height: float = Field(description="[m]")
-    distance: float = Field(description="from P_b to its edge [m]")
+    distance: float = Field(description="from the swing axis to its edge [m]")
     angle: float = Field(0.0, description="of the machine to the way across the edge [rad]")
     depth: float | None = Field(None, description="[m]; null without end")
 

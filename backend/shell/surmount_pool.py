@@ -12,7 +12,7 @@ from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -40,30 +40,43 @@ class Kept:
     def __post_init__(self) -> None:
         if self.path is None or not self.path.exists():
             return
-        for number, line in enumerate(self.path.read_text(encoding="utf-8").splitlines(), 1):
+        try:
+            text = self.path.read_text(encoding="utf-8")
+        except OSError as error:
+            raise InputError(f"{self.path}: cannot be read ({error.strerror}).") from error
+        except UnicodeDecodeError as error:
+            raise InputError(f"{self.path}: is no text; allowed are files of --keep.") from error
+        lines = text.split("\n")
+        # After the last line's end there is nothing, or what was cut while it was written.
+        whole, cut = lines[:-1], lines[-1]
+        for number, line in enumerate(whole, 1):
             try:
                 key, energy, why = json.loads(line)
-                self.found[str(key)] = Simulated(
-                    math.inf if energy is None else float(energy), str(why)
-                )
+                value = math.inf if energy is None else float(energy)
+                self.found[str(key)] = Simulated(value, str(why))
             except (ValueError, TypeError) as error:
-                if number == len(self.path.read_text(encoding="utf-8").splitlines()):
-                    continue  # interrupted while it was written
                 raise InputError(
                     f"{self.path}: line {number} holds no simulation; allowed are files that "
                     f"--keep wrote."
                 ) from error
+        if cut:
+            self._write("".join(f"{line}\n" for line in whole), "w")
 
     def add(self, rows: list[tuple[str, Simulated]]) -> None:
         """Kept from now on."""
         self.found.update(rows)
         if self.path is None or not rows:
             return
+        told = [
+            (key, one.energy if math.isfinite(one.energy) else None, one.why) for key, one in rows
+        ]
+        self._write("".join(f"{json.dumps(row)}\n" for row in told), "a")
+
+    def _write(self, text: str, mode: Literal["a", "w"]) -> None:
+        assert self.path is not None
         try:
-            with self.path.open("a", encoding="utf-8") as file:
-                for key, one in rows:
-                    energy = one.energy if math.isfinite(one.energy) else None
-                    file.write(json.dumps([key, energy, one.why]) + "\n")
+            with self.path.open(mode, encoding="utf-8") as file:
+                file.write(text)
         except OSError as error:
             raise InputError(f"{self.path}: cannot be written ({error.strerror}).") from error
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -88,13 +89,13 @@ class Climber:
         placed = placed + T[..., None, :3, 3]
         return np.asarray(placed[..., self.beside, :, :])
 
-    @property
+    @cached_property
     def beside(self) -> IntArray:
         """Indices of the bodies that are no belts."""
         belts = set(self.crawler.bodies)
         return np.array([k for k in range(len(self.machine.body_names)) if k not in belts])
 
-    @property
+    @cached_property
     def of_bucket(self) -> BoolArray:
         """By index of `beside`: whether the bucket's."""
         links = np.array(self.machine.body_links)[self.beside]

@@ -37,6 +37,10 @@ VERIFIED = 12
 """Whole manoeuvres that are gone through at most before a leg is given up."""
 OFFERED = 6
 """Candidates that are told."""
+SLIPS, SINKS = 0.005, 0.001
+"""No manoeuvre is told whose bucket slips farther, or of which anything is deeper in the ground
+[m].
+"""
 APART = 0.03
 """Shorter drives than this share of the crawler's base are left out."""
 
@@ -66,7 +70,7 @@ class LegPlan:
 @dataclass(frozen=True, eq=False)
 class Plan:
     """climber; legs; motion, in the course's frame (origin on the ground at the first edge), and
-    gone through in MuJoCo; z: of the course's first ground over the lowest [m].
+    run, what it was in MuJoCo, in the same frame.
     """
 
     climber: Climber
@@ -154,9 +158,22 @@ def plan(
     T = made_run.T_step_root.copy()
     T[:, 2, 3] += low
     made_run = replace(made_run, T_step_root=T, edge=made_run.edge + np.array([0.0, 0.0, low]))
-    if made_run.why:
-        return Refusal("simulation", made_run.why)
-    return Plan(ahead, tuple(plans), motion, made_run)
+    refusal = failed(made_run, demands)
+    return refusal if refusal is not None else Plan(ahead, tuple(plans), motion, made_run)
+
+
+def failed(made: Run, demands: Demands) -> Refusal | None:
+    """What does not hold in the simulation, whatever was worked out before; None where all does."""
+    if made.why:
+        return Refusal("simulation", made.why)
+    shares = np.abs(made.torques).max(axis=0) / demands.torques
+    if shares.max() > 1.0:
+        why = f"when gone through, a joint needs {100.0 * float(shares.max()):.0f} % of its torque"
+        return Refusal("torque", why)
+    if made.slip > SLIPS or made.deepest > SINKS:
+        why = f"the bucket slips {1e3 * made.slip:.0f} mm, {1e3 * made.deepest:.1f} mm deep at most"
+        return Refusal("simulation", why)
+    return None
 
 
 def course_terrain(ahead: Climber, edges: tuple[Edge, ...]) -> tuple[Boxes, float]:

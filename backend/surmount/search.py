@@ -198,8 +198,7 @@ class Search:
         front: list[_Rated] = []
         back: list[_Rated] = []
         p1s, p2s, p3s, slopes = axes
-        most = self.climber.machine.sun
-        stretch = sum(most.lengths[:3])
+        stretch = sum(self.climber.machine.sun.lengths[:3])
         for n, alpha in enumerate(slopes):
             if not self.told(n, len(slopes), "which parameters hold"):
                 raise CancelledError

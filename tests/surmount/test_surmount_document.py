@@ -15,6 +15,7 @@ from typer.testing import CliRunner
 
 from backend.documents.surmount_document import SurmountDocument
 from backend.documents.surmount_side import base_poses
+from backend.errors import InputError
 from backend.machine.kinematics import end_point
 from backend.machine.load import load_machine
 from cockpit.cli import app
@@ -143,10 +144,15 @@ def test_an_interrupted_search_goes_on(tmp_path: Path) -> None:
     kept.write_text("\n".join(lines[:5]) + "\n" + lines[5][:20])
     again = surmounted(tmp_path, task(), "--keep", str(kept))
     assert again == first
+    # And once more: what was cut is not in the way of what came after it.
+    assert len(kept.read_text().splitlines()) == len(lines)
+    assert surmounted(tmp_path, task(), "--keep", str(kept)) == first
     kept.write_text("nothing\n" * 3)
     path = tmp_path / "task.json"
-    bad = RUNNER.invoke(app, ["surmount", str(path), "--keep", str(kept)])
-    assert bad.exit_code != 0
+    for wrong in (kept, tmp_path, tmp_path / "none" / "kept.jsonl"):
+        bad = RUNNER.invoke(app, ["surmount", str(path), "--keep", str(wrong)])
+        assert isinstance(bad.exception, InputError), bad.output
+        assert str(wrong) in str(bad.exception)
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ from backend.surmount.course import Edge, legs
 from backend.surmount.halves import one_by_one, simulated
 from backend.surmount.judge import judge, own_bodies
 from backend.surmount.manoeuvre import manoeuvre
-from backend.surmount.plan import Plan, Refusal, demands_of, plan
+from backend.surmount.plan import Plan, Refusal, demands_of, failed, plan
 from backend.surmount.run import run, world_of
 from backend.surmount.search import Job
 
@@ -55,6 +55,24 @@ def test_simulated_energy_is_above_its_bounds_and_repeats(name: str) -> None:
     total = sum(one.energy for one in first)
     assert total > verdict.energy * 0.999
     assert verdict.energy > sum(one.potential for one in sequences) * 0.999
+
+
+def test_what_does_not_hold_when_gone_through_is_refused() -> None:
+    climber, step = climbing("ex13")
+    world = world_of(climber, step)
+    made = manoeuvre(climber, step, HOLDING["ex13"], None, world.options.step)
+    assert made.motion is not None
+    ran, demands = run(climber, world, made.motion), climber.demands
+    assert failed(ran, demands) is None
+    needed = np.abs(ran.torques).max(axis=0)
+    for broken, kind in (
+        (failed(replace(ran, slip=0.006), demands), "simulation"),
+        (failed(replace(ran, deepest=0.002), demands), "simulation"),
+        (failed(replace(ran, why="it falls"), demands), "simulation"),
+        (failed(ran, replace(demands, torques=0.99 * needed)), "torque"),
+    ):
+        assert broken is not None
+        assert broken.kind == kind
 
 
 def planned(name: str, edges: tuple[Edge, ...], **more: object) -> Plan | Refusal:
