@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numba import njit
 
@@ -146,3 +148,25 @@ def distances(
         i, j = index_a[k], index_b[k]
         found[k] = pair_distance(ca[i], Ra[i], ha[i], cb[j], Rb[j], hb[j], points[k])
     return found, points
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def near_point(
+    centers: Array, rotations: Array, halves: Array, point: Array, radius: float
+) -> IntArray:
+    """(k,) the boxes that come to a point (3,) as near as `radius` [m]."""
+    found, count = np.empty(len(centers), np.int64), 0
+    for i in range(len(centers)):
+        x, y, z = point[0] - centers[i, 0], point[1] - centers[i, 1], point[2] - centers[i, 2]
+        h = halves[i]
+        size = math.sqrt(h[0] * h[0] + h[1] * h[1] + h[2] * h[2])
+        if x * x + y * y + z * z > (radius + size) ** 2:
+            continue
+        apart = 0.0
+        for a in range(3):
+            along = rotations[i, 0, a] * x + rotations[i, 1, a] * y + rotations[i, 2, a] * z
+            apart += max(abs(along) - h[a], 0.0) ** 2
+        if apart <= radius * radius:
+            found[count] = i
+            count += 1
+    return found[:count].copy()

@@ -7,16 +7,16 @@ exceeds the distance and is positive whenever there is one, so no step passes a 
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
-from backend.cspace.margins_kernel import advance
+from backend.cspace.margins_kernel import advance, axes_of, limits
 from backend.machine.kinematics import link_poses
 from backend.machine.model import Machine
 from backend.spatial.boxes import Boxes
-from backend.spatial.types import Array, IntArray
+from backend.spatial.types import Array
 
 TOLERANCE = 1e-8
 """Bodies that are closer than they can move in this many radians count as touching (tens of
@@ -47,9 +47,15 @@ def margins(
     machine's own bodies [rad]. Never optimistic; see TOLERANCE. In contact already, the margin is
     0. The swing of a machine without limits ends after a whole turn.
     """
-    n = len(machine.joints)
+    return along(machine, q, each_joint(len(machine.joints)), obstacles, eta, slack)
+
+
+@lru_cache(maxsize=8)
+def each_joint(n: int) -> Array:
+    """(2 n, n) the directions of `margins`; read only."""
     directions = np.repeat(np.eye(n), 2, axis=0) * np.tile([-1.0, 1.0], n)[:, None]
-    return along(machine, q, directions, obstacles, eta, slack)
+    directions.setflags(write=False)
+    return directions
 
 
 def margin(
@@ -72,63 +78,43 @@ def along(
     slack: Array | None = None,
 ) -> list[Margin]:
     """`margin` in several directions (k, n) at once."""
-    q, directions = np.asarray(q, dtype=float), np.asarray(directions, dtype=float)
+    q, directions = np.array(q, dtype=float), np.array(directions, dtype=float)
     if not (np.isfinite(q).all() and np.isfinite(directions).all()):
         raise ValueError("joint values and directions must be finite numbers")
-    itself, apart = machine.self_pair_index, machine.self_pair_joints
-    far, T = machine.stretched_levers, link_poses(machine, q)
-    wrong = np.zeros(len(itself))
+    wrong = np.zeros(len(machine.self_pairs))
     if slack is not None:
-        reach = np.where(apart, far[itself[:, 0]] + far[itself[:, 1]], 0.0)
-        wrong = reach @ np.asarray(slack, dtype=float)
-    fastest = np.abs(directions).max(axis=1, initial=0.0)
+        wrong = machine.self_pair_levers @ np.asarray(slack, dtype=float)
+    ends, fastest, alone = limits(q, directions, machine.lower, machine.upper)
+    T = link_poses(machine, q)
     free, pair = advance(
         (machine.link_matrices, machine.link_parents, machine.link_joints),
         machine.body_link_index,
         machine.body_joints,
-        _arrays(machine.bodies),
-        _arrays(obstacles),
-        itself,
-        apart,
-        far,
+        machine.body_arrays,
+        (obstacles.centers.copy(), obstacles.rotations.copy(), obstacles.half_extents.copy()),
+        machine.self_pair_index,
+        machine.self_pair_joints,
+        machine.stretched_levers,
         float(eta),
         wrong,
         T,
         q,
         directions,
-        np.where(np.count_nonzero(directions, axis=1) == 1, np.abs(directions).argmax(axis=1), -1),
-        _axes(machine, T),
-        _limits(machine, q, directions, fastest),
+        alone,
+        axes_of(T, machine.joint_links, machine.joint_axes),
+        ends,
         TOLERANCE / np.maximum(fastest, 1e-300),
     )
-    return [_named(free[k], pair[k], len(obstacles), itself) for k in range(len(directions))]
+    n, itself = len(obstacles), machine.self_pairs
+    return [_named(f, k, n, itself) for f, k in zip(free.tolist(), pair.tolist(), strict=True)]
 
 
-def _named(free: float, pair: int, obstacles: int, itself: IntArray) -> Margin:
+def _named(
+    free: float, pair: int, obstacles: int, itself: tuple[tuple[int, int], ...]
+) -> Margin:
     if pair < 0:
-        return Margin(float(free), None, None, False)
+        return Margin(free, None, None, False)
     against = pair - len(itself)
     if against < 0:
-        return Margin(float(free), int(itself[pair, 0]), int(itself[pair, 1]), True)
-    return Margin(float(free), against // obstacles, against % obstacles, False)
-
-
-def _limits(machine: Machine, q: Array, directions: Array, fastest: Array) -> Array:
-    """(k,) the s at which the first joint meets its limit; a whole turn when nothing limits."""
-    moving = directions != 0.0
-    end = np.where(directions > 0.0, machine.upper, machine.lower) - q
-    with np.errstate(divide="ignore", invalid="ignore"):
-        first = np.where(moving, end / directions, np.inf).min(axis=1, initial=np.inf)
-        turn = np.where(fastest > 0.0, 2.0 * math.pi / fastest, 0.0)
-    return np.asarray(np.maximum(np.minimum(first, turn), 0.0))
-
-
-def _axes(machine: Machine, T: Array) -> Array:
-    """(joints, 2, 3) origins and unit vectors of the joints' axes at link poses T, root frame."""
-    links = machine.joint_links
-    axes = (T[links, :3, :3] @ machine.joint_axes[:, :, None])[:, :, 0]
-    return np.stack([T[links, :3, 3], axes], axis=1)
-
-
-def _arrays(boxes: Boxes) -> tuple[Array, Array, Array]:
-    return boxes.centers.copy(), boxes.rotations.copy(), boxes.half_extents.copy()
+        return Margin(free, *itself[pair], True)
+    return Margin(free, against // obstacles, against % obstacles, False)

@@ -7,8 +7,9 @@ import math
 import numpy as np
 from numba import njit
 
-from backend.collision.box_kernels import pair_distance
+from backend.collision.fast_box_kernels import boxes_apart
 from backend.cspace.exact_boxes import gap
+from backend.machine.chain_kernel import placed
 from backend.spatial.types import Array, BoolArray, IntArray
 
 CLOSE = 0.05
@@ -18,12 +19,14 @@ itself is measured: corner to corner it is larger than the gap along every axis 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def place(
-    M: Array, parents: IntArray, joints: IntArray, q: Array, link: int, c: Array, R: Array
+    M: Array, parents: IntArray, joints: IntArray, q: Array, link: int, until: int, c: Array, R: Array
 ) -> None:
-    """Move center c (3,) and rotation R (3, 3) from the link's frame to the root's, in place."""
+    """Move center c (3,) and rotation R (3, 3) from the link's frame to that of the link `until`
+    below it, in place; -1 is what the root stands in.
+    """
     T, moved, turned = np.empty((3, 4)), np.empty(3), np.empty((3, 3))
     i = link
-    while i >= 0:
+    while i != until:
         s = v = 0.0
         if joints[i] >= 0:
             s, v = math.sin(q[joints[i]]), 1.0 - math.cos(q[joints[i]])
@@ -37,6 +40,17 @@ def place(
         c[:] = moved
         R[:] = turned
         i = parents[i]
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _common(parents: IntArray, a: int, b: int) -> int:
+    """The link that carries both links and is nearest to them."""
+    while a != b:
+        if a > b:  # parents come first
+            a = parents[a]
+        else:
+            b = parents[b]
+    return a
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
@@ -68,22 +82,41 @@ def _copy(c: Array, R: Array, to_c: Array, to_R: Array) -> None:
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _placed(own: tuple[Array, Array, Array], links: IntArray, T: Array) -> tuple[Array, Array]:
-    """Centers (n, 3) and rotations (n, 3, 3) of all bodies in the root frame."""
-    n = len(links)
-    centers, rotations = np.empty((n, 3)), np.empty((n, 3, 3))
-    for i in range(n):
-        pose = T[links[i]]
+def limits(
+    q: Array, directions: Array, lower: Array, upper: Array
+) -> tuple[Array, Array, IntArray]:
+    """Of directions (k, n) from q (n,): the s (k,) at which the first joint meets its limit, a
+    whole turn when nothing limits; the fastest joint's rate (k,); the only joint (k,) that moves,
+    -1 where there are more or none.
+    """
+    count, n = directions.shape
+    ends, fastest, alone = np.zeros(count), np.zeros(count), np.full(count, -1, np.int64)
+    for k in range(count):
+        end, moving = math.inf, 0
+        for j in range(n):
+            rate = directions[k, j]
+            if rate != 0.0:
+                moving += 1
+                alone[k] = j if moving == 1 else -1
+                fastest[k] = max(fastest[k], abs(rate))
+                end = min(end, ((upper[j] if rate > 0.0 else lower[j]) - q[j]) / rate)
+        if moving:
+            ends[k] = max(min(end, 2.0 * math.pi / fastest[k]), 0.0)
+    return ends, fastest, alone
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def axes_of(T: Array, links: IntArray, axes: Array) -> Array:
+    """(joints, 2, 3) origins and unit vectors of the joints' axes at link poses T (L, 4, 4)."""
+    out = np.empty((len(links), 2, 3))
+    for j in range(len(links)):
+        pose = T[links[j]]
         for a in range(3):
-            centers[i, a] = pose[a, 3]
-            for b in range(3):
-                centers[i, a] += pose[a, b] * own[0][i, b]
-                rotations[i, a, b] = (
-                    pose[a, 0] * own[1][i, 0, b]
-                    + pose[a, 1] * own[1][i, 1, b]
-                    + pose[a, 2] * own[1][i, 2, b]
-                )
-    return centers, rotations
+            out[j, 0, a] = pose[a, 3]
+            out[j, 1, a] = (
+                pose[a, 0] * axes[j, 0] + pose[a, 1] * axes[j, 1] + pose[a, 2] * axes[j, 2]
+            )
+    return out
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
@@ -144,8 +177,8 @@ def advance(
     (joints, 2, 3) origins and unit vectors at q; steps: (k,) the least advance.
     """
     n, m, p = len(links), len(others[0]), len(itself)
-    points = np.empty((2, 3))
-    centers, rotations = _placed(own, links, T)
+    work, points = np.empty((11, 3)), np.empty((2, 3))
+    centers, rotations = placed(own[0], own[1], links, T)
     radius, other_radius = np.empty(n), np.empty(m)
     for i in range(n):
         radius[i] = math.sqrt((own[2][i] ** 2).sum())
@@ -249,10 +282,14 @@ def advance(
                         for x in range(joints):
                             posture[x] = q[x] + s * directions[k, x]
                         _copy(own[0][i], own[1][i], ca, Ra)
-                        place(chain[0], chain[1], chain[2], posture, links[i], ca, Ra)
                         if c < p:
+                            # Against each other: what moves both alike is left out.
+                            both = _common(chain[1], links[i], links[j])
+                            place(chain[0], chain[1], chain[2], posture, links[i], both, ca, Ra)
                             _copy(own[0][j], own[1][j], cb2, Rb2)
-                            place(chain[0], chain[1], chain[2], posture, links[j], cb2, Rb2)
+                            place(chain[0], chain[1], chain[2], posture, links[j], both, cb2, Rb2)
+                        else:
+                            place(chain[0], chain[1], chain[2], posture, links[i], -1, ca, Ra)
                     d = 0.0
                     for x in range(3):
                         d += (ca[x] - cb2[x]) ** 2
@@ -263,7 +300,7 @@ def advance(
                         enough = less + rate * (free[k] - s) + CLOSE
                         g = max(g, gap(ca, Ra, own[2][i], cb2, Rb2, hb, enough))
                         if 0.0 < g < less + CLOSE and less > 0.0:
-                            g = pair_distance(ca, Ra, own[2][i], cb2, Rb2, hb, points)
+                            g = boxes_apart(ca, Ra, own[2][i], cb2, Rb2, hb, work, points)
                     g -= less
                 if g < rate * steps[k]:
                     free[k], pair[k] = s, c

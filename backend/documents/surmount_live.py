@@ -122,8 +122,9 @@ def around(
     people, whose = people_of(snapshot, config)
     found, names = concatenated([*boxes, people]), [*names, *whose]
     radius = config.machines[name].bounding_radius + step.distance + TRAVEL
-    on = within(found, body, radius) & [not _is(one, step.name) for one in names]
-    return found.take(on), tuple(n for n, near in zip(names, on, strict=True) if near), keep
+    near = within(found, body.swing_center, radius).tolist()
+    on = [k for k in near if not _is(names[k], step.name)]
+    return found.take(np.array(on, dtype=np.int64)), tuple(names[k] for k in on), keep
 
 
 def step_of(name: str, boxes: Boxes, k: int, T_site_root: Array) -> Step | str:

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from backend.machine import chain_kernel
 from backend.machine.model import Machine
-from backend.spatial.boxes import Boxes
+from backend.spatial.boxes import Boxes, known_boxes
 from backend.spatial.types import Array, IntArray
 
 
@@ -20,6 +21,12 @@ def link_poses(machine: Machine, q: Array, T_site_root: Array | None = None) -> 
     """
     q = np.asarray(q, dtype=float)
     M = machine.link_matrices
+    if q.ndim == 1 and (T_site_root is None or np.ndim(T_site_root) == 2):
+        root = np.eye(4) if T_site_root is None else np.array(T_site_root, dtype=float)
+        poses = chain_kernel.link_poses(
+            M, machine.link_parents, machine.link_joints, q.copy(), root
+        )
+        return np.asarray(poses)
     T_parent_link = np.empty((*q.shape[:-1], M.shape[1], 4, 4))
     T_parent_link[...] = M[0]
     # Rodrigues: T(q) = T_parent_joint (I + sin(q) K + (1 - cos(q)) K^2).
@@ -44,10 +51,13 @@ def link_poses(machine: Machine, q: Array, T_site_root: Array | None = None) -> 
 
 def body_boxes(machine: Machine, T_site_links: Array) -> Boxes:
     """The machine's bodies in the site frame for one configuration. T_site_links: (L, 4, 4)."""
-    T = T_site_links[machine.body_link_index]
-    R = T[:, :3, :3]
-    centers = (R @ machine.bodies.centers[:, :, None])[:, :, 0] + T[:, :3, 3]
-    return Boxes(centers, R @ machine.bodies.rotations, machine.bodies.half_extents)
+    centers, rotations, _ = machine.body_arrays
+    placed = chain_kernel.placed(
+        centers, rotations, machine.body_link_index, np.array(T_site_links, dtype=float)
+    )
+    if not np.isfinite(placed[0]).all():
+        raise ValueError("link poses must be finite numbers")
+    return known_boxes(*placed, machine.bodies.half_extents)
 
 
 def end_point_of(machine: Machine, T_site_links: Array) -> Array:
@@ -131,7 +141,13 @@ def body_point_jacobians(
 
     T_site_links: (L, 4, 4) of one configuration; bodies: (k,) indices; points: (k, 3) [m].
     """
-    T = T_site_links[machine.joint_links]
-    z = np.stack([T[k, :3, :3] @ machine.links[i].axis for k, i in enumerate(machine.joint_links)])
-    J = np.cross(z[None], points[:, None] - T[None, :, :3, 3])
-    return np.swapaxes(np.where(machine.body_joints[bodies][..., None], J, 0.0), 1, 2)
+    return np.asarray(
+        chain_kernel.point_jacobians(
+            np.array(T_site_links, dtype=float),
+            machine.joint_links,
+            machine.joint_axes,
+            machine.body_joints,
+            np.array(bodies, dtype=np.int64),
+            np.array(points, dtype=float),
+        )
+    )

@@ -177,27 +177,27 @@ class Machine:
     lidars: tuple[LidarMount, ...] = ()
     strokes: tuple[Stroke, ...] = ()  # of the cylinders that the sidecar describes
 
-    @property
+    @cached_property
     def lower(self) -> Array:
         """(n,) [rad], -inf for continuous joints."""
         return np.array([j.lower for j in self.joints])
 
-    @property
+    @cached_property
     def upper(self) -> Array:
         """(n,) [rad], +inf for continuous joints."""
         return np.array([j.upper for j in self.joints])
 
-    @property
+    @cached_property
     def max_velocity(self) -> Array:
         """(n,) [rad/s]."""
         return np.array([j.max_velocity for j in self.joints])
 
-    @property
+    @cached_property
     def max_acceleration(self) -> Array:
         """(n,) [rad/s^2]."""
         return np.array([j.max_acceleration for j in self.joints])
 
-    @property
+    @cached_property
     def max_torque(self) -> Array:
         """(n,) [N m], infinite where none is stated."""
         return np.array([j.max_torque for j in self.joints])
@@ -229,6 +229,12 @@ class Machine:
             # Links below the swing joint are reached through the root instead.
             radius = max(radius, chain + (float(T_swing_root) if i < 0 else 0.0))
         return radius
+
+    @cached_property
+    def body_arrays(self) -> tuple[Array, Array, Array]:
+        """Centers, rotations and half extents of the bodies, writable as kernels want them."""
+        boxes = self.bodies
+        return boxes.centers.copy(), boxes.rotations.copy(), boxes.half_extents.copy()
 
     @cached_property
     def body_link_index(self) -> IntArray:
@@ -274,7 +280,8 @@ class Machine:
             [
                 next(i for i, link in enumerate(self.links) if link.joint == k)
                 for k in range(len(self.joints))
-            ]
+            ],
+            dtype=np.int64,
         )
 
     @cached_property
@@ -305,6 +312,12 @@ class Machine:
         """(p, n) the joints that move the bodies of a pair against each other: carry only one."""
         pairs = self.self_pair_index
         return np.asarray(self.body_joints[pairs[:, 0]] != self.body_joints[pairs[:, 1]])
+
+    @cached_property
+    def self_pair_levers(self) -> Array:
+        """(p, n) how far the bodies of a pair come nearer per joint rate, at most [m]."""
+        far, pairs = self.stretched_levers, self.self_pair_index
+        return np.where(self.self_pair_joints, far[pairs[:, 0]] + far[pairs[:, 1]], 0.0)
 
     @cached_property
     def body_parts(self) -> AnyArray:

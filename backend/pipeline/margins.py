@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 
 import numpy as np
 
-from backend.cspace.margins import Margin, along
+from backend.cspace.margins import Margin, along, each_joint
 from backend.fusion.inflation import joint_slack
 from backend.machine.model import Machine
 from backend.machine.stopping import full_stopping_distances, stopping_distances
@@ -22,7 +22,6 @@ from backend.pipeline.records import (
     PairDistance,
 )
 from backend.pipeline.surroundings import Surroundings, growth, surroundings_of, why_unknown
-from backend.spatial.types import Array
 
 STILL = 1e-3  # [rad/s] joints slower than this do not count as moving
 
@@ -43,22 +42,23 @@ def machine_margins(
     around = surroundings_of(own, machines, config, gauge, people)
     eta = growth(own, machines, config)
     n = len(machine.joints)
-    directions = np.repeat(np.eye(n), 2, axis=0) * np.tile([-1.0, 1.0], n)[:, None]
+    directions = each_joint(n)
     rates = pose.joint_velocities
     moving = bool(np.isfinite(rates).all()) and float(np.abs(rates).max()) > STILL
     if moving:
         directions = np.concatenate([directions, rates[None]])
     found = along(machine, pose.joints, directions, around.boxes, eta, joint_slack(pose))
-    now = stopping_distances(machine, rates, config.stop_latency)
-    full = full_stopping_distances(machine, config.stop_latency)
+    now = stopping_distances(machine, rates, config.stop_latency).tolist()
+    full = full_stopping_distances(machine, config.stop_latency).tolist()
+    speeds = rates.tolist()
     return MachineMargins(
         own,
         eta,
         "",
         tuple(
             (
-                _freedom(own, machine, around, found[2 * k], k, -1.0, rates, now, full),
-                _freedom(own, machine, around, found[2 * k + 1], k, 1.0, rates, now, full),
+                _freedom(own, machine, around, found[2 * k], k, -1.0, speeds, now, full),
+                _freedom(own, machine, around, found[2 * k + 1], k, 1.0, speeds, now, full),
             )
             for k in range(n)
         ),
@@ -85,20 +85,20 @@ def _freedom(
     margin: Margin,
     joint: int,
     sign: float,
-    rates: Array,
-    now: Array,
-    full: Array,
+    rates: list[float],
+    now: list[float],
+    full: list[float],
 ) -> Freedom:
     body, hit = names(own, machine, around, margin)
-    rate, fastest = sign * float(rates[joint]), machine.joints[joint].max_velocity
+    rate, fastest = sign * rates[joint], machine.joints[joint].max_velocity
     return Freedom(
         free=margin.free,
         own=body,
         hits=hit,
         time_now=margin.free / rate if rate > STILL else float("inf"),
         time_full=margin.free / fastest,
-        stop_now=max(sign * float(now[joint]), 0.0),
-        stop_full=float(full[joint]),
+        stop_now=max(sign * now[joint], 0.0),
+        stop_full=full[joint],
     )
 
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from types import MappingProxyType
 
 import numpy as np
@@ -30,7 +31,7 @@ from backend.safety.tip_over import TipOver
 from backend.spatial.identity import ByIdentity
 from backend.spatial.types import Array
 from backend.stability.allowance import allowed_fractions, travel_fraction
-from backend.stability.capacity import holding_reach
+from backend.stability.capacity import DIRECTIONS, holding_reach
 from backend.stability.masses import why_unknown
 from backend.stability.polygon import shrunk
 from backend.stability.records import Stability
@@ -40,6 +41,8 @@ WINDOW = 0.2
 """Of the joint rates whose slope is the acceleration [s]."""
 CURVE_PERIOD = 1.0
 """Between two curves of how far out a payload may be held [s]."""
+SLICE = 6
+"""Directions of a curve that are worked out in one cycle: all at once would make it late."""
 _NO_CURVE: Array = np.zeros(0)
 STATE_PERIOD = 0.04
 """Between two judgements of how firmly a machine stands, where there are several [s]."""
@@ -62,15 +65,28 @@ class Rates:
 
 
 @dataclass(frozen=True)
+class Curve:
+    """How far out a payload may be held [m]. reach: by direction, empty before the first; begun:
+    when the newest was begun [s]; parts: of it, until it is whole.
+    """
+
+    reach: Array = field(default_factory=lambda: _NO_CURVE)
+    begun: float = -math.inf
+    parts: tuple[Array, ...] = ()
+
+
+_NOTHING = Curve()
+
+
+@dataclass(frozen=True)
 class Standing:
     """What a cycle hands to the next: by machine the recent rates, and how far out it may hold its
-    payload, which is worked out anew every `CURVE_PERIOD`, for one machine a cycle: `holds` with
-    the times of that; left: in which period the motions' fractions were judged, and they, (n, 2)
+    payload, which is worked out anew every `CURVE_PERIOD`, a slice of one machine's a cycle; left: in which period the motions' fractions were judged, and they, (n, 2)
     and (2,); found: in which period each machine was judged, and how it stood.
     """
 
     recent: Mapping[str, Rates] = field(default_factory=dict)
-    holds: Mapping[str, tuple[float, Array]] = field(default_factory=dict)
+    holds: Mapping[str, Curve] = field(default_factory=dict)
     left: Mapping[str, tuple[int, Array, Array]] = field(default_factory=dict)
     found: Mapping[str, tuple[int, Stability]] = field(default_factory=dict)
 
@@ -78,16 +94,16 @@ class Standing:
 def following(
     before: Standing, machines: Mapping[str, MachineState], now: float, config: Config
 ) -> Standing:
-    """With the rates of this cycle, and a curve where one is due."""
+    """With the rates of this cycle, and a slice of a curve where one is due."""
     recent = {name: _with(before.recent.get(name), s.pose) for name, s in machines.items()}
     known = [name for name, state in machines.items() if not _why(state, name, config)]
-    holds = {name: one for name, one in before.holds.items() if name in known}
-    made = {name: holds.get(name, (-math.inf, _NO_CURVE))[0] for name in known}
-    due = [name for name, at in made.items() if now - at >= CURVE_PERIOD]
+    holds = {name: before.holds.get(name, _NOTHING) for name in known}
+    due = [name for name in known if holds[name].parts or now - holds[name].begun >= CURVE_PERIOD]
     rules = config.stability
     if due and rules is not None:
-        name = min(due, key=lambda one: made[one])
-        holds[name] = now, _curve(config.machines[name], machines[name], name, config, rules)
+        # What was begun is ended first.
+        name = min(due, key=lambda one: (not holds[one].parts, holds[one].begun))
+        holds[name] = _further(holds[name], machines[name], name, now, config, rules)
     return Standing(recent, holds, before.left, before.found)
 
 
@@ -126,7 +142,7 @@ def standing(
         if last is None or at != period or len(machines) == 1:
             last = _of(name, state, memory, config, rules)
         kept[name] = period, last
-        holds = memory.holds.get(name, (0.0, _NO_CURVE))[1]
+        holds = memory.holds.get(name, _NOTHING).reach
         found[name] = last if last.holds is holds else replace(last, holds=holds)
     return replace(memory, found=kept), found
 
@@ -185,7 +201,7 @@ def _payload(name: str, config: Config, rules: TipOver) -> float:
 def _why(state: MachineState, name: str, config: Config) -> str:
     """Why nothing is known of a machine, else empty."""
     pose = state.pose
-    why = why_unknown(config.machines[name])
+    why = _masses_unknown(ByIdentity(config.machines[name]))
     if not why and (pose.validity is not Validity.VALID or state.body is None):
         why = pose.reasons[0] if pose.reasons else "the pose is unknown"
     if not why and not _slope_known(pose):
@@ -193,14 +209,25 @@ def _why(state: MachineState, name: str, config: Config) -> str:
     return why
 
 
-def _curve(
-    machine: Machine, state: MachineState, name: str, config: Config, rules: TipOver
-) -> Array:
+@lru_cache(maxsize=64)
+def _masses_unknown(machine: ByIdentity[Machine]) -> str:
+    return why_unknown(machine.value)
+
+
+def _further(
+    curve: Curve, state: MachineState, name: str, now: float, config: Config, rules: TipOver
+) -> Curve:
+    """The curve with one slice more; shown once it is whole."""
     assert state.body is not None
-    payload = _payload(name, config, rules)
+    machine, payload = config.machines[name], _payload(name, config, rules)
     _, support = models(ByIdentity(machine), payload)
-    T = state.body.link_poses[0]
-    return holding_reach(machine, support, state.pose.joints, payload, T, rules.keep)
+    T, first = state.body.link_poses[0], SLICE * len(curve.parts)
+    args = machine, support, state.pose.joints, payload, T, rules.keep
+    part = holding_reach(*args, slice(first, first + SLICE))
+    parts, begun = (*curve.parts, part), curve.begun if curve.parts else now
+    if first + SLICE < DIRECTIONS:
+        return Curve(curve.reach, begun, parts)
+    return Curve(np.concatenate(parts), begun)
 
 
 def _of(
@@ -232,7 +259,7 @@ def _of(
         (noise, spread),
         state.body.link_poses[0],
     )
-    return replace(found, holds=memory.holds.get(name, (0.0, _NO_CURVE))[1])
+    return replace(found, holds=memory.holds.get(name, _NOTHING).reach)
 
 
 def _slope_known(pose: FusedPose) -> bool:
@@ -262,5 +289,5 @@ def _with(before: Rates | None, pose: FusedPose) -> Rates:
     if before.stamps and not pose.time > before.stamps[-1]:
         return before if pose.time == before.stamps[-1] else Rates()
     keep = sum(stamp < pose.time - WINDOW for stamp in before.stamps)
-    rates = tuple(float(rate) for rate in pose.joint_velocities)
+    rates = tuple(pose.joint_velocities.tolist())
     return Rates((*before.stamps[keep:], pose.time), (*before.rates[keep:], rates))

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
 
-from backend.pipeline.records import MachineState
+from backend.pipeline.records import Body3D, MachineState
 from backend.site.named_bodies import SiteBodies
 from backend.spatial.identity import ByIdentity
-from backend.spatial.types import BoolArray
+from backend.spatial.types import Array, BoolArray, IntArray
 
 NEAR = 0.10
 """Its top this near to the plane of the tracks [m]."""
@@ -26,28 +26,53 @@ def but_ground(around: SiteBodies, state: MachineState) -> SiteBodies:
     """
     if state.body is None or not len(around.boxes):
         return around
-    under = np.flatnonzero(_under(around, state))
-    if not len(under):
-        return around
-    return _without(ByIdentity(around), tuple(int(k) for k in under))
+    return _but_ground(ByIdentity(around), ByIdentity(state.body))
 
 
-def _under(around: SiteBodies, state: MachineState) -> BoolArray:
-    """(n,) whether the middle of the tracks' plane is on the top of a box."""
-    assert state.body is not None
-    T, boxes = state.body.link_poses[0], around.boxes
+@lru_cache(maxsize=32)
+def _but_ground(around: ByIdentity[SiteBodies], body: ByIdentity[Body3D]) -> SiteBodies:
+    """Asked for more than once a cycle."""
+    under = _under(around.value, body.value.link_poses[0])
+    return _without(around, tuple(under)) if under else around.value
+
+
+@dataclass(frozen=True)
+class _Tops:
+    """Of n boxes the axis that is nearest to the vertical: its number and, upwards, its unit
+    vector (n, 3), with the middle of the top (n, 3) [m]; standable: (n,) of the site, no gauge.
+    """
+
+    number: IntArray
+    axis: Array
+    middle: Array
+    standable: BoolArray
+
+
+@lru_cache(maxsize=16)
+def _tops(around: ByIdentity[SiteBodies]) -> _Tops:
+    boxes = around.value.boxes
     steep = np.abs(boxes.rotations[:, 2])  # of each axis, its upward part
     up = steep.argmax(axis=1)
     rows = np.arange(len(up))
     axis = boxes.rotations[rows, :, up] * np.sign(boxes.rotations[rows, 2, up])[:, None]
-    level = axis @ T[:3, 2] > math.cos(LEVEL)
-    away = np.einsum("nij,ni->nj", boxes.rotations, T[:3, 3] - boxes.centers)
-    inside = np.abs(away) <= boxes.half_extents
-    inside[rows, up] = True
-    height = np.abs(away[rows, up]) - boxes.half_extents[rows, up]
-    over = (T[:3, 3] - boxes.centers) @ T[:3, 2] > 0.0
-    site = np.array([not name.startswith("gauge:") for name in around.names], dtype=bool)
-    return np.asarray(level & inside.all(axis=1) & (np.abs(height) < NEAR) & over & site)
+    site = np.array([not name.startswith("gauge:") for name in around.value.names], dtype=bool)
+    middle = boxes.centers + boxes.half_extents[rows, up][:, None] * axis
+    return _Tops(up, axis, middle, site)
+
+
+def _under(around: SiteBodies, T: Array) -> list[int]:
+    """Boxes on the top of which the middle of the tracks' plane is. T: (4, 4) of the tracks."""
+    tops, boxes = _tops(ByIdentity(around)), around.boxes
+    height = np.abs(((T[:3, 3] - tops.middle) * tops.axis).sum(axis=1))
+    level = tops.axis @ T[:3, 2] > math.cos(LEVEL)
+    found = []
+    for k in np.flatnonzero(level & (height < NEAR) & tops.standable).tolist():
+        off = T[:3, 3] - boxes.centers[k]
+        inside = np.abs(boxes.rotations[k].T @ off) <= boxes.half_extents[k]
+        inside[tops.number[k]] = True
+        if inside.all() and off @ T[:3, 2] > 0.0:
+            found.append(k)
+    return found
 
 
 @lru_cache(maxsize=64)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
+from backend.collision.box_kernels import near_point
 from backend.fusion.pose import Validity
 from backend.machine.model import Machine
 from backend.pipeline.config import Config
@@ -24,7 +26,8 @@ from backend.pipeline.working_gauge import site_of
 from backend.site.named_bodies import SiteBodies
 from backend.spatial import transform
 from backend.spatial.boxes import NO_BOXES, Boxes, concatenated
-from backend.spatial.types import BoolArray
+from backend.spatial.identity import ByIdentity
+from backend.spatial.types import Array, BoolArray, IntArray
 
 PARTNER, SITE, PEOPLE = "partner", "site", "people"
 
@@ -106,24 +109,21 @@ def surroundings(
 
     body: where `machine` is; others: all other machines by name; people: boxes and names.
     """
-    apart = np.linalg.norm(site.boxes.centers - body.swing_center, axis=1)
-    # Few boxes of a large site are near: only those are looked at, and named.
-    near = np.flatnonzero(apart <= machine.bounding_radius + site.radii)
-    around = site.boxes.take(near)
-    kept = within(around, body, machine.bounding_radius)
-    boxes = [around.take(kept)]
-    names = [site.full_names[k] for k in near[kept]]
-    of_site = len(names)
+    boxes: list[Boxes] = []
+    names: list[str] = []
+
+    def keep(some: Boxes, called: Sequence[str]) -> int:
+        if len(some):
+            near = within(some, body.swing_center, machine.bounding_radius)
+            boxes.append(some.take(near))
+            names.extend([called[k] for k in near.tolist()])
+        return len(names)
+
+    of_site = keep(site.boxes, site.full_names)
     for name, (other, placed) in others.items():
-        kept = within(placed.boxes, body, machine.bounding_radius)
-        boxes.append(placed.boxes.take(kept))
-        names += [
-            f"{name}:{part}" for part, near_ in zip(other.body_names, kept, strict=True) if near_
-        ]
+        keep(placed.boxes, _names_of(name, ByIdentity(other)))
     machines = len(names)
-    kept = within(people[0], body, machine.bounding_radius)
-    boxes.append(people[0].take(kept))
-    names += [name for name, near_ in zip(people[1], kept, strict=True) if near_]
+    keep(*people)
     number = np.arange(len(names))
     return Surroundings(
         concatenated(boxes).moved(transform.inverse(body.link_poses[0])),
@@ -133,9 +133,12 @@ def surroundings(
     )
 
 
-def within(boxes: Boxes, body: Body3D, radius: float) -> BoolArray:
-    """(n,) whether a box comes closer to the swing centre than `radius` [m]."""
-    to_center = body.swing_center - boxes.centers
-    local = np.abs(np.einsum("nji,nj->ni", boxes.rotations, to_center))
-    outside = np.maximum(local - boxes.half_extents, 0.0)
-    return np.asarray(np.linalg.norm(outside, axis=1) <= radius)
+@lru_cache(maxsize=64)
+def _names_of(name: str, machine: ByIdentity[Machine]) -> tuple[str, ...]:
+    return tuple(f"{name}:{part}" for part in machine.value.body_names)
+
+
+def within(boxes: Boxes, center: Array, radius: float) -> IntArray:
+    """(k,) the boxes that come closer to `center` (3,) than `radius` [m]."""
+    arrays = boxes.centers, boxes.rotations, boxes.half_extents
+    return np.asarray(near_point(*arrays, np.array(center, dtype=float), radius))

@@ -43,7 +43,7 @@ class Boxes:
 
     def take(self, index: IntArray | BoolArray) -> Boxes:
         """The boxes at `index`: indices or a mask along the first axis."""
-        return _known(self.centers[index], self.rotations[index], self.half_extents[index])
+        return known_boxes(self.centers[index], self.rotations[index], self.half_extents[index])
 
     def inflated(self, margin: float) -> Boxes:
         """Each box grown by `margin` [m] on every side (contains the Minkowski sum with a ball)."""
@@ -51,12 +51,14 @@ class Boxes:
 
     def moved(self, T: Array) -> Boxes:
         """The boxes in another frame. T: (4, 4) from theirs to that one."""
+        if not np.isfinite(T).all():
+            raise ValueError("a transform must be finite numbers")
         R = T[:3, :3]
-        return Boxes(self.centers @ R.T + T[:3, 3], R @ self.rotations, self.half_extents)
+        return known_boxes(self.centers @ R.T + T[:3, 3], R @ self.rotations, self.half_extents)
 
 
-def _known(centers: Array, rotations: Array, half_extents: Array) -> Boxes:
-    """Boxes of arrays that come from other boxes and belong to nobody else: not checked again."""
+def known_boxes(centers: Array, rotations: Array, half_extents: Array) -> Boxes:
+    """Boxes of arrays that belong to nobody else, or are other boxes': not checked again."""
     boxes = object.__new__(Boxes)
     for name, values in (
         ("centers", centers),
@@ -74,7 +76,7 @@ NO_BOXES = Boxes(np.zeros((0, 3)), np.zeros((0, 3, 3)), np.zeros((0, 3)))
 def concatenated(parts: Iterable[Boxes]) -> Boxes:
     """All boxes of one frame, in order; none when there are no parts."""
     all_parts = [NO_BOXES, *parts]
-    return _known(
+    return known_boxes(
         np.concatenate([p.centers for p in all_parts]),
         np.concatenate([p.rotations for p in all_parts]),
         np.concatenate([p.half_extents for p in all_parts]),

@@ -16,10 +16,12 @@ from backend.machine.kinematics import end_point
 from backend.machine.model import Machine
 from backend.machine.sun_map import sun_angles
 from backend.spatial import transform
+from backend.spatial.identity import ByIdentity
 from backend.spatial.types import Array
 from backend.stability.dynamics import rest_wrench
 from backend.stability.masses import MassModel, mass_model
 from backend.stability.polygon import Polygon, shrunk
+from backend.stability.state import models
 from backend.stability.zmp import moments_of
 
 DIRECTIONS = 36
@@ -55,8 +57,8 @@ def lift_capacity(
     InputError when masses are not known or `least` is no share.
     """
     within = shrunk(support, least)
-    empty = _static(mass_model(machine, 0.0, at), within, q, T_site_root)
-    loaded = _static(mass_model(machine, _PROBE, at), within, q, T_site_root)
+    empty = _static(_model(machine, 0.0, at), within, q, T_site_root)
+    loaded = _static(_model(machine, _PROBE, at), within, q, T_site_root)
     taken = (empty - loaded) / _PROBE
     with np.errstate(divide="ignore", invalid="ignore"):
         most = np.where(taken > 0.0, empty / taken, np.inf).min(axis=-1)
@@ -122,8 +124,9 @@ def holding_reach(
     payload: float,
     T_site_root: Array | None = None,
     least: float = 0.0,
+    directions: slice = slice(None),
 ) -> Array:
-    """(DIRECTIONS,) up to which reach `payload` [kg] may be held with the tip as high, the bucket
+    """(DIRECTIONS,), or those of them that are asked for: up to which reach `payload` [kg] may be held with the tip as high, the bucket
     at the attitude and the elbow on the side that q (n,) has now [m]; NaN where nowhere.
 
     Directions are of the tip from the swing axis, in the root frame, evenly from -pi. Tilt and
@@ -137,7 +140,7 @@ def holding_reach(
     chart = capacity_chart(
         machine,
         support,
-        np.asarray(azimuths, dtype=float),
+        np.asarray(azimuths[directions], dtype=float),
         np.asarray(reaches, dtype=float),
         float(height),
         float(theta.sum()),
@@ -146,6 +149,12 @@ def holding_reach(
         elbow=1 if np.sin(theta[1]) <= 0.0 else -1,
     )
     return farthest(chart, payload)
+
+
+def _model(machine: Machine, payload: float, at: Array | None) -> MassModel:
+    if at is None:
+        return models(ByIdentity(machine), payload)[0]
+    return mass_model(machine, payload, at)
 
 
 def _static(model: MassModel, support: Polygon, q: Array, T_site_root: Array | None) -> Array:

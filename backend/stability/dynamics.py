@@ -15,7 +15,7 @@ import numpy as np
 
 from backend.spatial.types import Array
 from backend.stability.masses import GRAVITY, MassModel
-from backend.stability.wrench_kernel import wrenches
+from backend.stability.wrench_kernel import body_centres, wrenches
 
 
 class Wrench(NamedTuple):
@@ -28,25 +28,9 @@ class Wrench(NamedTuple):
 def centres(model: MassModel, q: Array) -> Array:
     """(B, ..., 3) centre of mass of each body [m], root frame. q: (..., n) [rad]."""
     q = np.asarray(q, dtype=float)
-    count, batch = len(model.masses), q.shape[:-1]
-    R = np.empty((count, *batch, 3, 3))
-    p = np.empty((count, *batch, 3))
-    R0, p0 = model.T_parent_joint[:, :3, :3], model.T_parent_joint[:, :3, 3]
-    s, v = np.sin(q), 1.0 - np.cos(q)
-    for b in range(count):
-        above, k = model.parents[b], model.joints[b]
-        if above < 0:
-            R[b], p[b] = R0[b], p0[b]
-            continue
-        x, y, z = model.axes[b]
-        K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-        turned = (
-            R0[b] + s[..., k, None, None] * (R0[b] @ K) + v[..., k, None, None] * (R0[b] @ K @ K)
-        )
-        R[b] = R[above] @ turned
-        p[b] = R[above] @ p0[b] + p[above]
-    lead = (slice(None), *([None] * len(batch)), slice(None), None)
-    return np.asarray((R @ model.coms[lead])[..., 0] + p)
+    rows = _rows(q, q.shape[:-1], q.shape[-1])
+    found = body_centres(model.tree, model.frames, model.coms, rows)
+    return np.asarray(found.reshape(len(model.masses), *q.shape[:-1], 3))
 
 
 def down(T_site_root: Array | None) -> Array:
@@ -81,10 +65,9 @@ def wrench_of(model: MassModel, q: Array, qd: Array, qdd: Array, g: Array) -> Wr
     n = q.shape[-1]
     batch = np.broadcast_shapes(q.shape[:-1], qd.shape[:-1], qdd.shape[:-1], g.shape[:-1])
     states = [_rows(x, batch, n) for x in (q, qd, qdd)]
-    T = model.T_parent_joint
     out = wrenches(
-        (model.parents, model.joints),
-        (np.ascontiguousarray(T[:, :3, :3]), np.ascontiguousarray(T[:, :3, 3]), model.axes),
+        model.tree,
+        model.frames,
         (model.masses, model.coms, model.tensors),
         *states,
         _rows(g, batch, 3),

@@ -6,12 +6,13 @@ Nothing is concluded from masses that nobody vouches for: `why_unknown` says so 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from backend.errors import InputError
 from backend.machine.model import Machine
-from backend.spatial.types import Array, IntArray, frozen
+from backend.spatial.types import Array, BoolArray, IntArray, frozen
 
 GRAVITY = 9.81
 """[m/s^2]."""
@@ -35,6 +36,25 @@ class MassModel:
     coms: Array
     tensors: Array
     payload: float
+
+    @cached_property
+    def tree(self) -> tuple[IntArray, IntArray]:
+        """(B,) parents and joints, as kernels take them."""
+        return self.parents, self.joints
+
+    @cached_property
+    def frames(self) -> tuple[Array, Array, Array]:
+        """(B, 3, 3) and (B, 3) of each body in its parent's at joint value 0, and (B, 3) axes."""
+        T = self.T_parent_joint
+        return np.ascontiguousarray(T[:, :3, :3]), np.ascontiguousarray(T[:, :3, 3]), self.axes
+
+    @cached_property
+    def carried(self) -> BoolArray:
+        """(B,) whether a joint beyond the swing moves the body."""
+        moved = np.zeros(len(self.masses), dtype=bool)
+        for b, above in enumerate(self.parents.tolist()):  # parents come first
+            moved[b] = self.joints[b] > 0 or (above >= 0 and moved[above])
+        return moved
 
     @property
     def total(self) -> float:

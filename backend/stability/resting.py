@@ -40,10 +40,9 @@ class Resting:
     def arguments(self) -> tuple[object, ...]:
         """Of both kernels."""
         model, support = self.model, self.support
-        T = model.T_parent_joint
         return (
-            (model.parents, model.joints),
-            (np.ascontiguousarray(T[:, :3, :3]), np.ascontiguousarray(T[:, :3, 3]), model.axes),
+            model.tree,
+            model.frames,
             (model.masses, model.coms),
             (support.normals.copy(), (support.vertices * support.normals).sum(axis=1)),
             np.array(self.g),

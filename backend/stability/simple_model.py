@@ -44,7 +44,7 @@ def two_masses(model: MassModel, support: Polygon, q: Array) -> TwoMasses:
     The edges are those of the box around the support polygon: exact for a rectangle.
     """
     at = centres(model, q)
-    moving = np.array([_carried(model, b) for b in range(len(model.masses))])
+    moving = model.carried
     M, m = model.masses[~moving].sum(), model.masses[moving].sum()
     still = np.tensordot(model.masses[~moving], at[~moving], 1) / M
     r_TB = np.tensordot(model.masses[moving], at[moving], 1) / m - still
@@ -107,12 +107,3 @@ def _per_axis(two: TwoMasses) -> tuple[Array, Array, Array, Array]:
 def _distance(two: TwoMasses) -> Array:
     """rho (...) of the moving part from the non-moving part's centre, never 0 [m]."""
     return np.asarray(np.maximum(np.hypot(two.r_TB[..., 0], two.r_TB[..., 1]), 1e-12))
-
-
-def _carried(model: MassModel, body: int) -> bool:
-    """Whether a joint beyond the swing moves the body."""
-    while body >= 0:
-        if model.joints[body] > 0:
-            return True
-        body = int(model.parents[body])
-    return False

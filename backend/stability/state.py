@@ -42,14 +42,12 @@ def stability(
     """
     model, support = models(ByIdentity(machine), payload)
     n = len(q)
-    still = np.zeros((2 * n, n))
     # The motion itself, then each rate and each acceleration off by its sigma.
-    v = np.concatenate([[rates], rates + np.diag(noise[0]), rates + still[:n]])
-    a = np.concatenate(
-        [[accelerations], accelerations + still[:n], accelerations + np.diag(noise[1])]
-    )
-    wrench = ground_wrench(model, q, v, a, T_site_root)
-    points = zmp_of(wrench)
+    v, a = np.tile(rates, (2 * n + 1, 1)), np.tile(accelerations, (2 * n + 1, 1))
+    joint = np.arange(n)
+    v[1 + joint, joint] += noise[0]
+    a[1 + n + joint, joint] += noise[1]
+    points = zmp_of(ground_wrench(model, q, v, a, T_site_root))
     left = margin(points, support)
     two = two_masses(model, support, np.asarray(q, dtype=float))
     with np.errstate(invalid="ignore"):

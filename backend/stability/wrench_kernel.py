@@ -85,6 +85,39 @@ def wrenches(
 
 
 @njit(cache=True, nogil=True)
+def body_centres(
+    tree: tuple[IntArray, IntArray], frames: tuple[Array, Array, Array], coms: Array, q: Array
+) -> Array:
+    """(B, k, 3) the bodies' centres of mass at q (k, n), root frame; the others as in `wrenches`."""
+    parents, joints = tree
+    R0, p0, axes = frames
+    count, k = len(parents), len(q)
+    out = np.zeros((count, k, 3))
+    R, p, turned = np.zeros((count, 3, 3)), np.zeros((count, 3)), np.zeros((3, 3))
+    for i in range(k):
+        for b in range(count):
+            above, j = parents[b], joints[b]
+            if above < 0:
+                R[b], p[b] = R0[b], p0[b]
+            else:
+                _about(axes[b], np.sin(q[i, j]), np.cos(q[i, j]), turned)
+                for r in range(3):
+                    p[b, r] = p[above, r]
+                    for c in range(3):
+                        p[b, r] += R[above, r, c] * p0[b, c]
+                        mixed = 0.0
+                        for s in range(3):
+                            for t in range(3):
+                                mixed += R[above, r, s] * R0[b, s, t] * turned[t, c]
+                        R[b, r, c] = mixed
+            for r in range(3):
+                out[b, i, r] = p[b, r]
+                for c in range(3):
+                    out[b, i, r] += R[b, r, c] * coms[b, c]
+    return out
+
+
+@njit(cache=True, nogil=True)
 def _cross(
     a0: float, a1: float, a2: float, b0: float, b1: float, b2: float
 ) -> tuple[float, float, float]:
