@@ -22,6 +22,7 @@ from backend.shell.app.wire import decode
 from backend.shell.link.session import open_session, with_port
 from backend.site.site import load_site
 from cockpit.bench_rows import percentile_rows
+from cockpit.memory import memory_of
 
 SITE = "demo"
 MACHINES = ("left", "right")
@@ -77,7 +78,7 @@ def live_rows(seconds: float, site: str = SITE, name: str = "live") -> list[Benc
         for subscriber in subscribers:
             subscriber.undeclare()
         session.close()
-        memory = resident(process.pid)
+        memory = memory_of(process.pid)
     latencies = _latencies(arrivals, frames)
     last = frames[-1][1]["backend"]
     rows = percentile_rows(f"{name} pose arrival on Zenoh to websocket", latencies, 60.0)
@@ -205,20 +206,3 @@ def _end(process: subprocess.Popen) -> None:
         process.wait(timeout=5.0)
     except subprocess.TimeoutExpired:
         process.kill()
-
-
-def resident(pid: int) -> float:
-    """Resident memory of a process and of those that it started [MiB]; NaN where it is not told.
-
-    What they share counts once for each: the sum is never too small.
-    """
-    status = Path(f"/proc/{pid}/status")
-    if not status.is_file():
-        return float(np.nan)
-    total = 0.0
-    for line in status.read_text().splitlines():
-        if line.startswith("VmRSS"):
-            total = float(line.split()[1]) / 1024.0
-    for children in Path(f"/proc/{pid}/task").glob("*/children"):
-        total += sum(resident(int(child)) for child in children.read_text().split())
-    return total

@@ -109,9 +109,7 @@ def along(
     return [_named(f, k, n, itself) for f, k in zip(free.tolist(), pair.tolist(), strict=True)]
 
 
-def _named(
-    free: float, pair: int, obstacles: int, itself: tuple[tuple[int, int], ...]
-) -> Margin:
+def _named(free: float, pair: int, obstacles: int, itself: tuple[tuple[int, int], ...]) -> Margin:
     if pair < 0:
         return Margin(free, None, None, False)
     against = pair - len(itself)

@@ -19,7 +19,14 @@ itself is measured: corner to corner it is larger than the gap along every axis 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def place(
-    M: Array, parents: IntArray, joints: IntArray, q: Array, link: int, until: int, c: Array, R: Array
+    M: Array,
+    parents: IntArray,
+    joints: IntArray,
+    q: Array,
+    link: int,
+    until: int,
+    c: Array,
+    R: Array,
 ) -> None:
     """Move center c (3,) and rotation R (3, 3) from the link's frame to that of the link `until`
     below it, in place; -1 is what the root stands in.

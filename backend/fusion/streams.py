@@ -177,13 +177,16 @@ def _take(
         delays, slice_start = (delay, delays[0]), entry.arrival
     elif delay < delays[0]:
         delays = (delay, delays[1])
-    return replace(
-        streams,
+    # Written out: `replace` takes three times as long, and this runs for every message.
+    return Streams(
         buffers={**streams.buffers, key: taken},
+        strangers=streams.strangers,
+        no_fix=streams.no_fix,
+        clock=streams.clock,
+        stepped=entry.arrival if stepped else streams.stepped,
         delays=delays,
         slice_start=slice_start,
         accepted=entry.arrival,
-        stepped=entry.arrival if stepped else streams.stepped,
     )
 
 

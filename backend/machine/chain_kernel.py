@@ -27,18 +27,14 @@ def link_poses(M: Array, parents: IntArray, joints: IntArray, q: Array, T_root: 
         above = T_root if parents[i] < 0 else out[parents[i]]
         for a in range(3):
             for b in range(4):
-                out[i, a, b] = (
-                    above[a, 0] * T[0, b] + above[a, 1] * T[1, b] + above[a, 2] * T[2, b]
-                )
+                out[i, a, b] = above[a, 0] * T[0, b] + above[a, 1] * T[1, b] + above[a, 2] * T[2, b]
             out[i, a, 3] += above[a, 3]
         out[i, 3, 3] = 1.0
     return out
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def placed(
-    centers: Array, rotations: Array, links: IntArray, poses: Array
-) -> tuple[Array, Array]:
+def placed(centers: Array, rotations: Array, links: IntArray, poses: Array) -> tuple[Array, Array]:
     """Centers (n, 3) and rotations (n, 3, 3) of bodies that move with `links` (n,) at link poses
     (L, 4, 4).
     """

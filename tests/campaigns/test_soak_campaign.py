@@ -10,7 +10,7 @@ import pytest
 from live import all_valid, backend
 from watched import Watch
 
-from cockpit.bench_live import resident
+from cockpit.memory import memory_of
 
 MINUTES = float(os.environ.get("SOAK_MINUTES", "10"))
 ALLOWED = 1.0  # MiB per minute after the first minute
@@ -26,7 +26,7 @@ def test_two_browsers(watch: Watch) -> None:
         while (elapsed := (time.monotonic() - begun) / 60.0) < MINUTES:
             time.sleep(5.0)
             minutes.append(elapsed)
-            memory.append(resident(station.process.pid))
+            memory.append(memory_of(station.process.pid))
             heaps.append([p.page.evaluate("performance.memory.usedJSHeapSize") for p in pages])
             assert station.process.poll() is None
         later = np.array(minutes) > 1.0

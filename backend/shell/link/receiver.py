@@ -1,7 +1,8 @@
 """Everything that arrives from a site's machines, as samples in order of arrival.
 
-Zenoh's callbacks only enqueue: one slow callback would hold up every subscriber of the session.
-Decoding happens in `drain`, in the caller's thread.
+Messages are decoded one by one as they come, in Zenoh's callbacks: that is some ten microseconds
+each, where a batch of them at the beginning of a cycle would make that cycle late. Callbacks do no
+more than that: a slow one would hold up every subscriber of the session.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ import time
 from collections import Counter, deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeAlias
 
 from backend.errors import InputError
 from backend.fusion.samples import ClockSample, Sample
@@ -42,6 +43,10 @@ class Heard:
     row: Topic
     payload: bytes
     arrival: float
+
+
+_Waiting: TypeAlias = tuple[Heard | ClockSample, Sample | None]
+"""What came, and what the fusion takes of it."""
 
 
 @dataclass(frozen=True)
@@ -86,7 +91,7 @@ class Receiver:
         self._session = session
         self._machines = dict(machines)
         self._clock = clock
-        self._queue: deque[Heard | ClockSample] = deque()
+        self._queue: deque[_Waiting] = deque()
         self._everything = everything
         self._record_clouds = clouds
         self._clouds: dict[str, deque[Heard]] = {}
@@ -113,30 +118,15 @@ class Receiver:
         self._poller.start()
 
     def drain(self) -> Drained:
-        """Everything since the last call, decoded. Call it from one thread."""
+        """Everything since the last call. Call it from one thread."""
         with self._lock:
             raw, self._queue = self._queue, deque()
             malformed, self._malformed = self._malformed, Counter()
             foreign, self._foreign = self._foreign, Counter()
             lost, self._lost = self._lost, 0
             beside, self._beside, self._beside_bytes = self._beside, deque(), 0
-        samples: list[Sample] = []
-        for item in raw:
-            if isinstance(item, ClockSample):
-                samples.append(item)
-                continue
-            try:
-                message = decode(item.machine, item.suffix, item.payload, item.arrival)
-            except DecodeError:
-                self._count(malformed, f"{item.machine}/{item.suffix}")
-                continue
-            if isinstance(message, AgentStatus):
-                self._statuses[item.machine] = message
-            elif isinstance(message, TrueState):
-                self._truths[item.machine] = message
-            elif not isinstance(message, Command):
-                samples.append(message)
-        heard = [item for item in raw if isinstance(item, ClockSample) or item.row.recorded]
+        samples = [sample for _, sample in raw if sample is not None]
+        heard = [item for item, _ in raw if isinstance(item, ClockSample) or item.row.recorded]
         if beside:
             heard = list(heapq.merge(heard, beside, key=_arrival))  # keeps the order of either
         counts = tuple(malformed.items()), tuple(foreign.items())
@@ -154,11 +144,11 @@ class Receiver:
         self._count(self._malformed, label)
 
     def statuses(self) -> dict[str, AgentStatus]:
-        """The newest status of each machine's agent by the site's names, as of the last `drain`."""
+        """The newest status of each machine's agent by the site's names."""
         return dict(self._statuses)
 
     def truths(self) -> dict[str, TrueState]:
-        """The newest true state of each simulated machine, as of the last `drain`."""
+        """The newest true state of each simulated machine."""
         return dict(self._truths)
 
     def _count(self, counter: Counter[str], label: str) -> None:
@@ -199,7 +189,7 @@ class Receiver:
             return
         row = found[0]
         if _for_fusion(row):
-            self._append(Heard(machine, key_, suffix, row, payload.to_bytes(), arrival))
+            self._take(Heard(machine, key_, suffix, row, payload.to_bytes(), arrival))
         elif row.name == POINTS:
             self._put_cloud(Heard(machine, key_, suffix, row, payload.to_bytes(), arrival))
         elif self._everything and row.recorded:
@@ -220,9 +210,24 @@ class Receiver:
                 self._beside_bytes -= len(self._beside.popleft().payload)
                 self._lost += 1
 
-    def _append(self, item: Heard | ClockSample) -> None:
+    def _take(self, item: Heard) -> None:
+        sample: Sample | None = None
+        try:
+            message = decode(item.machine, item.suffix, item.payload, item.arrival)
+        except DecodeError:
+            self._count(self._malformed, f"{item.machine}/{item.suffix}")
+        else:
+            if isinstance(message, AgentStatus):
+                self._statuses[item.machine] = message
+            elif isinstance(message, TrueState):
+                self._truths[item.machine] = message
+            elif not isinstance(message, Command):
+                sample = message
+        self._append(item, sample)
+
+    def _append(self, item: Heard | ClockSample, sample: Sample | None) -> None:
         with self._lock:
-            self._queue.append(item)
+            self._queue.append((item, sample))
             if len(self._queue) > QUEUE:
                 self._queue.popleft()
                 self._lost += 1
@@ -234,6 +239,10 @@ class Receiver:
         self._count(self._foreign, name)
 
     def _poll(self, period: float) -> None:
+        # A quarter of a second of loading, which the first message should not have to wait for.
+        from backend.shell.link import typestore
+
+        assert typestore.TYPESTORE is not None
         while not self._closed.wait(period):
             for prefix, name in self._machines.items():
                 try:
@@ -255,7 +264,8 @@ class Receiver:
             except DecodeError:
                 self._count(self._malformed, f"{machine}/clock")
                 return
-            self._append(ClockSample(machine, sent, remote, received))
+            trip = ClockSample(machine, sent, remote, received)
+            self._append(trip, trip)
 
         self._session.get(
             key("clock", prefix),
