@@ -30,6 +30,7 @@ from backend.pipeline.partner_risks import pieces
 from backend.pipeline.partner_risks_kernel import first_meeting
 from backend.pipeline.place import place
 from backend.pipeline.records import Body3D
+from backend.pipeline.surroundings import within as near_bodies
 from backend.pipeline.watch import Cloud, Watched, watch
 from backend.planning.live import rehearse
 from backend.planning.trajectory import plan as trajectory
@@ -48,6 +49,7 @@ from backend.stability.masses import mass_model
 from backend.stability.polygon import support_polygon
 from backend.stability.resting import cells as tipping_cells
 from backend.stability.resting import resting, tips
+from backend.stability.state import stability
 from backend.stability.zmp import edge_moments
 from backend.tracking import tracker
 from backend.tracking.association import associate
@@ -88,6 +90,8 @@ def compile_kernels() -> None:
     pairs(near, machine.self_pair_index, 9.0)
     outlines_of(machine, near)
     margins(machine, q, near, 0.1, np.full(len(q), 0.01))
+    near_bodies(near, body.swing_center, 9.0)
+    stability(machine, 0.0, q, q, q, (q, q))
     motion = Motion(body.link_poses, body.link_poses[0], q, np.zeros(3), 0.0)
     rows = approach(machine, motion, machine, motion, "partner", 0.3, 0.1, 0.7)
     concern = Concern(

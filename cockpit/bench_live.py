@@ -12,6 +12,7 @@ import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from websockets.exceptions import ConnectionClosed
@@ -62,22 +63,18 @@ def crowded_site() -> str:
 def live_rows(seconds: float, site: str = SITE, name: str = "live") -> list[BenchRow]:
     """Cycle times of a running backend, its memory, and from a pose's arrival to the websocket."""
     endpoint = with_port("tcp/127.0.0.1:0")
-    with _backend(endpoint, site) as (process, url):
-        session = open_session(connect=[endpoint], mode="router")
-        arrivals: dict[str, list[float]] = {name: [] for name in MACHINES}
-        subscribers = [
-            session.declare_subscriber(
-                f"{name}/joint_states",
-                lambda _, times=arrivals[name]: times.append(time.monotonic()),
+    with _backend(endpoint, site) as (process, url), contextlib.ExitStack() as closing:
+        session = closing.enter_context(_session(endpoint))
+        arrivals: dict[str, list[float]] = {machine: [] for machine in MACHINES}
+        for machine in MACHINES:
+            subscriber = session.declare_subscriber(
+                f"{machine}/joint_states",
+                lambda _, times=arrivals[machine]: times.append(time.monotonic()),
             )
-            for name in MACHINES
-        ]
+            closing.callback(subscriber.undeclare)
         time.sleep(1.0)  # both subscriptions stand before the first message
         with _machines(endpoint, site):
             frames = _listen(url, seconds)
-        for subscriber in subscribers:
-            subscriber.undeclare()
-        session.close()
         memory = memory_of(process.pid)
     latencies = _latencies(arrivals, frames)
     last = frames[-1][1]["backend"]
@@ -180,6 +177,16 @@ def _backend(endpoint: str, site: str) -> Iterator[tuple[subprocess.Popen[str], 
     finally:
         _end(process)
         shutil.rmtree(recordings, ignore_errors=True)
+
+
+@contextlib.contextmanager
+def _session(endpoint: str) -> Iterator[Any]:
+    """Closed whatever happens: a program cannot end while one is open."""
+    session = open_session(connect=[endpoint], mode="router")
+    try:
+        yield session
+    finally:
+        session.close()
 
 
 @contextlib.contextmanager

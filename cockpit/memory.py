@@ -9,8 +9,9 @@ from pathlib import Path
 def memory_of(pid: int) -> float:
     """Of a process and of those that it started [MiB]; NaN where the system does not tell.
 
-    What is theirs alone counts for each. A file that several of them map, such as a library, lies in
-    memory once: it counts once, as what they have of it together or all of it, whichever is less.
+    What is theirs alone counts for each. A file that several of them map, such as a library, lies
+    in memory once: it counts once, as what they have of it together or as all of it, whichever is
+    less.
     The sum is never too small.
     """
     own, mapped = 0.0, dict[str, float]()

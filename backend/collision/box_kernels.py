@@ -150,7 +150,7 @@ def distances(
     return found, points
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True)
 def near_point(
     centers: Array, rotations: Array, halves: Array, point: Array, radius: float
 ) -> IntArray:

@@ -40,7 +40,7 @@ def gap(ca: Array, Ra: Array, ha: Array, cb: Array, Rb: Array, hb: Array, enough
     best = max(best, abs(t1) - a1 - q10 * b0 - q11 * b1 - q12 * b2)
     best = max(best, abs(t2) - a2 - q20 * b0 - q21 * b1 - q22 * b2)
     if best > enough:
-        return best
+        return float(best)
     s = abs(t0 * r00 + t1 * r10 + t2 * r20)
     best = max(best, s - b0 - q00 * a0 - q10 * a1 - q20 * a2)
     s = abs(t0 * r01 + t1 * r11 + t2 * r21)
@@ -48,7 +48,7 @@ def gap(ca: Array, Ra: Array, ha: Array, cb: Array, Rb: Array, hb: Array, enough
     s = abs(t0 * r02 + t1 * r12 + t2 * r22)
     best = max(best, s - b2 - q02 * a0 - q12 * a1 - q22 * a2)
     if best > enough:
-        return best
+        return float(best)
     s = abs(t2 * r10 - t1 * r20)
     s -= a1 * q20 + a2 * q10 + b1 * q02 + b2 * q01
     best = max(best, _along_cross(s, r00))
@@ -75,8 +75,7 @@ def gap(ca: Array, Ra: Array, ha: Array, cb: Array, Rb: Array, hb: Array, enough
     best = max(best, _along_cross(s, r21))
     s = abs(t1 * r02 - t0 * r12)
     s -= a0 * q12 + a1 * q02 + b0 * q21 + b1 * q20
-    best = max(best, _along_cross(s, r22))
-    return best
+    return float(max(best, _along_cross(s, r22)))
 
 
 @njit(cache=True, nogil=True, inline="always")  # type: ignore[untyped-decorator]

@@ -53,7 +53,7 @@ def margins(
 @lru_cache(maxsize=8)
 def each_joint(n: int) -> Array:
     """(2 n, n) the directions of `margins`; read only."""
-    directions = np.repeat(np.eye(n), 2, axis=0) * np.tile([-1.0, 1.0], n)[:, None]
+    directions: Array = np.repeat(np.eye(n), 2, axis=0) * np.tile([-1.0, 1.0], n)[:, None]
     directions.setflags(write=False)
     return directions
 

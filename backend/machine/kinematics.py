@@ -51,13 +51,11 @@ def link_poses(machine: Machine, q: Array, T_site_root: Array | None = None) -> 
 
 def body_boxes(machine: Machine, T_site_links: Array) -> Boxes:
     """The machine's bodies in the site frame for one configuration. T_site_links: (L, 4, 4)."""
-    centers, rotations, _ = machine.body_arrays
-    placed = chain_kernel.placed(
-        centers, rotations, machine.body_link_index, np.array(T_site_links, dtype=float)
-    )
-    if not np.isfinite(placed[0]).all():
+    T, links = np.array(T_site_links, dtype=float), machine.body_link_index
+    centers, rotations = chain_kernel.placed(*machine.body_arrays[:2], links, T)
+    if not np.isfinite(centers).all():
         raise ValueError("link poses must be finite numbers")
-    return known_boxes(*placed, machine.bodies.half_extents)
+    return known_boxes(centers, rotations, machine.bodies.half_extents)
 
 
 def end_point_of(machine: Machine, T_site_links: Array) -> Array:

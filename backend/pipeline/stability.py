@@ -81,8 +81,9 @@ _NOTHING = Curve()
 @dataclass(frozen=True)
 class Standing:
     """What a cycle hands to the next: by machine the recent rates, and how far out it may hold its
-    payload, which is worked out anew every `CURVE_PERIOD`, a slice of one machine's a cycle; left: in which period the motions' fractions were judged, and they, (n, 2)
-    and (2,); found: in which period each machine was judged, and how it stood.
+    payload, which is worked out anew every `CURVE_PERIOD`, a slice of one machine's a cycle; left:
+    in which period the motions' fractions were judged, and they, (n, 2) and (2,); found: in which
+    period each machine was judged, and how it stood.
     """
 
     recent: Mapping[str, Rates] = field(default_factory=dict)

@@ -23,6 +23,7 @@ from backend.safety.surmounting import Surmounting
 from backend.shell.hub import Hub
 from backend.shell.image_loops import ImageLoop, ImageLoops, Stopwatch, ticks
 from backend.shell.kinds import Wishes
+from backend.shell.priority import thread_first
 from backend.site.gauge_choice import NO_CHOICE, GaugeChoice
 
 TELL_AGAIN = 1.0
@@ -100,6 +101,7 @@ class Runner:
             self._thread.join(timeout=2.0)
 
     def _guard(self) -> None:
+        thread_first()
         try:
             self._fast()
         except Exception as error:

@@ -126,8 +126,9 @@ def holding_reach(
     least: float = 0.0,
     directions: slice = slice(None),
 ) -> Array:
-    """(DIRECTIONS,), or those of them that are asked for: up to which reach `payload` [kg] may be held with the tip as high, the bucket
-    at the attitude and the elbow on the side that q (n,) has now [m]; NaN where nowhere.
+    """(DIRECTIONS,), or those of them that are asked for: up to which reach `payload` [kg] may be
+    held with the tip as high, the bucket at the attitude and the elbow on the side that q (n,) has
+    now [m]; NaN where nowhere.
 
     Directions are of the tip from the swing axis, in the root frame, evenly from -pi. Tilt and
     rotate joints are taken at 0. Up to the lengths of the arm's links and the joints' limits.

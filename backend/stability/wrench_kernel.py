@@ -88,7 +88,7 @@ def wrenches(
 def body_centres(
     tree: tuple[IntArray, IntArray], frames: tuple[Array, Array, Array], coms: Array, q: Array
 ) -> Array:
-    """(B, k, 3) the bodies' centres of mass at q (k, n), root frame; the others as in `wrenches`."""
+    """(B, k, 3) the bodies' centres of mass at q (k, n), root frame; others as in `wrenches`."""
     parents, joints = tree
     R0, p0, axes = frames
     count, k = len(parents), len(q)
