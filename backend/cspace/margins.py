@@ -13,7 +13,7 @@ from functools import lru_cache
 import numpy as np
 
 from backend.cspace.margins_kernel import advance, axes_of, limits
-from backend.machine.kinematics import link_poses
+from backend.machine.kinematics import posture
 from backend.machine.model import Machine
 from backend.spatial.boxes import Boxes
 from backend.spatial.types import Array
@@ -85,7 +85,7 @@ def along(
     if slack is not None:
         wrong = machine.self_pair_levers @ np.asarray(slack, dtype=float)
     ends, fastest, alone = limits(q, directions, machine.lower, machine.upper)
-    T = link_poses(machine, q)
+    T = posture(machine, q)
     free, pair = advance(
         (machine.link_matrices, machine.link_parents, machine.link_joints),
         machine.body_link_index,

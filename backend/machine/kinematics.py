@@ -1,14 +1,14 @@
 """Forward kinematics and Jacobians, vectorised over configurations.
 
 Frames: `site`, `root` (the URDF's root link), `link`. T_site_root is the base pose, identity when
-None. q: (..., n) joint values in the order of Machine.joints [rad].
+None. q: (..., n) joint values in the order of Machine.joints [rad]. Compiled code is loaded where
+it is first called: a page that shows a recording does not wait for it.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from backend.machine import chain_kernel
 from backend.machine.model import Machine
 from backend.spatial.boxes import Boxes, known_boxes
 from backend.spatial.types import Array, IntArray
@@ -21,12 +21,6 @@ def link_poses(machine: Machine, q: Array, T_site_root: Array | None = None) -> 
     """
     q = np.asarray(q, dtype=float)
     M = machine.link_matrices
-    if q.ndim == 1 and (T_site_root is None or np.ndim(T_site_root) == 2):
-        root = np.eye(4) if T_site_root is None else np.array(T_site_root, dtype=float)
-        poses = chain_kernel.link_poses(
-            M, machine.link_parents, machine.link_joints, q.copy(), root
-        )
-        return np.asarray(poses)
     T_parent_link = np.empty((*q.shape[:-1], M.shape[1], 4, 4))
     T_parent_link[...] = M[0]
     # Rodrigues: T(q) = T_parent_joint (I + sin(q) K + (1 - cos(q)) K^2).
@@ -49,13 +43,34 @@ def link_poses(machine: Machine, q: Array, T_site_root: Array | None = None) -> 
     return out
 
 
-def body_boxes(machine: Machine, T_site_links: Array) -> Boxes:
-    """The machine's bodies in the site frame for one configuration. T_site_links: (L, 4, 4)."""
+def posture(machine: Machine, q: Array, T_site_root: Array | None = None) -> Array:
+    """`link_poses` (L, 4, 4) of one configuration q (n,), T_site_root (4, 4), compiled: several of
+    them are asked for in every cycle.
+    """
+    from backend.machine import chain_kernel
+
+    root = np.eye(4) if T_site_root is None else np.array(T_site_root, dtype=float)
+    chain = machine.link_matrices, machine.link_parents, machine.link_joints
+    return np.asarray(chain_kernel.link_poses(*chain, np.array(q, dtype=float), root))
+
+
+def posture_boxes(machine: Machine, T_site_links: Array) -> Boxes:
+    """`body_boxes`, compiled."""
+    from backend.machine import chain_kernel
+
     T, links = np.array(T_site_links, dtype=float), machine.body_link_index
     centers, rotations = chain_kernel.placed(*machine.body_arrays[:2], links, T)
     if not np.isfinite(centers).all():
         raise ValueError("link poses must be finite numbers")
     return known_boxes(centers, rotations, machine.bodies.half_extents)
+
+
+def body_boxes(machine: Machine, T_site_links: Array) -> Boxes:
+    """The machine's bodies in the site frame for one configuration. T_site_links: (L, 4, 4)."""
+    T = T_site_links[machine.body_link_index]
+    R = T[:, :3, :3]
+    centers = (R @ machine.bodies.centers[:, :, None])[:, :, 0] + T[:, :3, 3]
+    return Boxes(centers, R @ machine.bodies.rotations, machine.bodies.half_extents)
 
 
 def end_point_of(machine: Machine, T_site_links: Array) -> Array:
@@ -139,6 +154,8 @@ def body_point_jacobians(
 
     T_site_links: (L, 4, 4) of one configuration; bodies: (k,) indices; points: (k, 3) [m].
     """
+    from backend.machine import chain_kernel
+
     return np.asarray(
         chain_kernel.point_jacobians(
             np.array(T_site_links, dtype=float),

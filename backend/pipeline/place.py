@@ -23,12 +23,12 @@ def base_transform(pose: FusedPose) -> Array:
 
 def place(machine: Machine, q: Array, T_site_root: Array) -> Body3D:
     """The machine at joint values q (n,) [rad] on a base T_site_root (4, 4)."""
-    link_poses = kinematics.link_poses(machine, q, T_site_root)
+    link_poses = kinematics.posture(machine, q, T_site_root)
     end_point = kinematics.end_point_of(machine, link_poses)
     swing_center = kinematics.swing_center(machine, T_site_root)
     return Body3D(
         link_poses=link_poses,
-        boxes=kinematics.body_boxes(machine, link_poses),
+        boxes=kinematics.posture_boxes(machine, link_poses),
         end_point=end_point,
         swing_center=swing_center,
         azimuth=float(kinematics.azimuth(machine, q, T_site_root)),
