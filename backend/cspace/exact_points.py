@@ -10,48 +10,10 @@ from numba import njit
 
 from backend.cspace.exact_boxes import gap
 from backend.cspace.ground import GROUND
+from backend.machine.chain_kernel import set_link_poses, set_placed
 from backend.machine.model import Machine
 from backend.spatial.boxes import Boxes, concatenated
 from backend.spatial.types import Array, BoolArray, IntArray
-
-
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _link_poses(M: Array, parents: IntArray, joints: IntArray, q: Array, T: Array) -> None:
-    """Set T (L, 3, 4) to the links' poses in the root frame; parents come before their links."""
-    moved = np.empty((3, 4))
-    for i in range(len(parents)):
-        s = v = 0.0
-        if joints[i] >= 0:
-            s, v = math.sin(q[joints[i]]), 1.0 - math.cos(q[joints[i]])
-        for a in range(3):
-            for b in range(4):
-                moved[a, b] = M[0, i, a, b] + s * M[1, i, a, b] + v * M[2, i, a, b]
-        if parents[i] < 0:
-            T[i] = moved
-            continue
-        P = T[parents[i]]
-        for a in range(3):
-            for b in range(4):
-                T[i, a, b] = P[a, 0] * moved[0, b] + P[a, 1] * moved[1, b] + P[a, 2] * moved[2, b]
-            T[i, a, 3] += P[a, 3]
-
-
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _place(
-    T: Array, own: tuple[Array, Array, Array], links: IntArray, centers: Array, rotations: Array
-) -> None:
-    """Bodies at the links' poses T, in the root frame."""
-    for i in range(len(links)):
-        P = T[links[i]]
-        for a in range(3):
-            centers[i, a] = P[a, 3]
-            for b in range(3):
-                centers[i, a] += P[a, b] * own[0][i, b]
-                rotations[i, a, b] = (
-                    P[a, 0] * own[1][i, 0, b]
-                    + P[a, 1] * own[1][i, 1, b]
-                    + P[a, 2] * own[1][i, 2, b]
-                )
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
@@ -73,7 +35,7 @@ def _hits(
     """
     n, m = len(links), len(others[0])
     centers, rotations = np.empty((n, 3)), np.empty((n, 3, 3))
-    T = np.empty((len(chain[1]), 3, 4))
+    T, root = np.empty((len(chain[1]), 3, 4)), np.eye(4)
     size, other_size = np.empty(n), np.empty(m)
     for i in range(n):
         size[i] = math.sqrt((own[2][i] ** 2).sum())
@@ -86,8 +48,8 @@ def _hits(
                 low[layer, a] = min(low[layer, a], others[0][j, a] - other_size[j])
                 high[layer, a] = max(high[layer, a], others[0][j, a] + other_size[j])
     for c in range(len(q)):
-        _link_poses(chain[0], chain[1], chain[2], q[c], T)
-        _place(T, own, links, centers, rotations)
+        set_link_poses(chain[0], chain[1], chain[2], q[c], root, T)
+        set_placed(own, links, T, centers, rotations)
         for layer in range(len(against)):
             for i in range(n):
                 if against[layer, c] or not counts[layer, i]:

@@ -9,7 +9,7 @@ from numba import njit
 
 from backend.collision.fast_box_kernels import boxes_apart
 from backend.cspace.exact_boxes import gap
-from backend.machine.chain_kernel import placed
+from backend.machine.chain_kernel import in_parent, placed
 from backend.spatial.types import Array, BoolArray, IntArray
 
 CLOSE = 0.05
@@ -34,12 +34,7 @@ def place(
     T, moved, turned = np.empty((3, 4)), np.empty(3), np.empty((3, 3))
     i = link
     while i != until:
-        s = v = 0.0
-        if joints[i] >= 0:
-            s, v = math.sin(q[joints[i]]), 1.0 - math.cos(q[joints[i]])
-        for a in range(3):
-            for b in range(4):
-                T[a, b] = M[0, i, a, b] + s * M[1, i, a, b] + v * M[2, i, a, b]
+        in_parent(M, joints, q, i, T)
         for a in range(3):
             moved[a] = T[a, 0] * c[0] + T[a, 1] * c[1] + T[a, 2] * c[2] + T[a, 3]
             for b in range(3):
@@ -185,7 +180,7 @@ def advance(
     """
     n, m, p = len(links), len(others[0]), len(itself)
     work, points = np.empty((11, 3)), np.empty((2, 3))
-    centers, rotations = placed(own[0], own[1], links, T)
+    centers, rotations = placed(own, links, T)
     radius, other_radius = np.empty(n), np.empty(m)
     for i in range(n):
         radius[i] = math.sqrt((own[2][i] ** 2).sum())

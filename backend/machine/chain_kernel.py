@@ -11,51 +11,75 @@ from backend.spatial.types import Array, IntArray
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def link_poses(M: Array, parents: IntArray, joints: IntArray, q: Array, T_root: Array) -> Array:
-    """(L, 4, 4) of links in the frame that T_root (4, 4) leads to; M, parents, joints as in
-    Machine.link_matrices, .link_parents, .link_joints; q: (n,) [rad].
+def in_parent(M: Array, joints: IntArray, q: Array, link: int, T: Array) -> None:
+    """Set T (3, 4) to the link's pose in its parent, Rodrigues; M, joints as in
+    Machine.link_matrices, .link_joints; q: (n,) [rad].
     """
-    count = len(parents)
-    out, T = np.zeros((count, 4, 4)), np.empty((3, 4))
-    for i in range(count):
-        s = v = 0.0
-        if joints[i] >= 0:
-            s, v = math.sin(q[joints[i]]), 1.0 - math.cos(q[joints[i]])
-        for a in range(3):
-            for b in range(4):
-                T[a, b] = M[0, i, a, b] + s * M[1, i, a, b] + v * M[2, i, a, b]
-        above = T_root if parents[i] < 0 else out[parents[i]]
-        for a in range(3):
-            for b in range(4):
-                out[i, a, b] = above[a, 0] * T[0, b] + above[a, 1] * T[1, b] + above[a, 2] * T[2, b]
-            out[i, a, 3] += above[a, 3]
-        out[i, 3, 3] = 1.0
-    return out
+    s = v = 0.0
+    if joints[link] >= 0:
+        s, v = math.sin(q[joints[link]]), 1.0 - math.cos(q[joints[link]])
+    for a in range(3):
+        for b in range(4):
+            T[a, b] = M[0, link, a, b] + s * M[1, link, a, b] + v * M[2, link, a, b]
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def placed(centers: Array, rotations: Array, links: IntArray, poses: Array) -> tuple[Array, Array]:
-    """Centers (n, 3) and rotations (n, 3, 3) of bodies that move with `links` (n,) at link poses
-    (L, 4, 4).
+def set_link_poses(
+    M: Array, parents: IntArray, joints: IntArray, q: Array, T_root: Array, poses: Array
+) -> None:
+    """Set the upper three rows of poses (L, 3 or 4, 4) to those of links in the frame that T_root
+    (3 or 4, 4) leads to; parents as in Machine.link_parents, the others as in `in_parent`.
     """
-    n = len(links)
-    c, R = np.empty((n, 3)), np.empty((n, 3, 3))
-    for i in range(n):
+    T = np.empty((3, 4))
+    for i in range(len(parents)):
+        in_parent(M, joints, q, i, T)
+        above = T_root if parents[i] < 0 else poses[parents[i]]
+        for a in range(3):
+            for b in range(4):
+                poses[i, a, b] = (
+                    above[a, 0] * T[0, b] + above[a, 1] * T[1, b] + above[a, 2] * T[2, b]
+                )
+            poses[i, a, 3] += above[a, 3]
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def link_poses(M: Array, parents: IntArray, joints: IntArray, q: Array, T_root: Array) -> Array:
+    """(L, 4, 4), as in `set_link_poses`."""
+    poses = np.zeros((len(parents), 4, 4))
+    poses[:, 3, 3] = 1.0
+    set_link_poses(M, parents, joints, q, T_root, poses)
+    return poses
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def set_placed(
+    bodies: tuple[Array, Array, Array], links: IntArray, poses: Array, centers: Array, R: Array
+) -> None:
+    """Set centers (n, 3) and rotations R (n, 3, 3) to those of bodies that move with `links` (n,)
+    at link poses (L, 3 or 4, 4); bodies: Machine.body_arrays.
+    """
+    for i in range(len(links)):
         T = poses[links[i]]
         for a in range(3):
-            c[i, a] = (
-                T[a, 0] * centers[i, 0]
-                + T[a, 1] * centers[i, 1]
-                + T[a, 2] * centers[i, 2]
-                + T[a, 3]
-            )
+            centers[i, a] = T[a, 3]
             for b in range(3):
+                centers[i, a] += T[a, b] * bodies[0][i, b]
                 R[i, a, b] = (
-                    T[a, 0] * rotations[i, 0, b]
-                    + T[a, 1] * rotations[i, 1, b]
-                    + T[a, 2] * rotations[i, 2, b]
+                    T[a, 0] * bodies[1][i, 0, b]
+                    + T[a, 1] * bodies[1][i, 1, b]
+                    + T[a, 2] * bodies[1][i, 2, b]
                 )
-    return c, R
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def placed(
+    bodies: tuple[Array, Array, Array], links: IntArray, poses: Array
+) -> tuple[Array, Array]:
+    """Centers (n, 3) and rotations (n, 3, 3), as in `set_placed`."""
+    n = len(links)
+    centers, R = np.empty((n, 3)), np.empty((n, 3, 3))
+    set_placed(bodies, links, poses, centers, R)
+    return centers, R
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]

@@ -59,7 +59,7 @@ def posture_boxes(machine: Machine, T_site_links: Array) -> Boxes:
     from backend.machine import chain_kernel
 
     T, links = np.array(T_site_links, dtype=float), machine.body_link_index
-    centers, rotations = chain_kernel.placed(*machine.body_arrays[:2], links, T)
+    centers, rotations = chain_kernel.placed(machine.body_arrays, links, T)
     if not np.isfinite(centers).all():
         raise ValueError("link poses must be finite numbers")
     return known_boxes(centers, rotations, machine.bodies.half_extents)

@@ -177,6 +177,9 @@ class Machine:
     lidars: tuple[LidarMount, ...] = ()
     strokes: tuple[Stroke, ...] = ()  # of the cylinders that the sidecar describes
 
+    # Arrays that are made once, here and below, are left writable: a copy in another process is,
+    # and kernels are compiled for either kind. Nobody may write to them.
+
     @cached_property
     def lower(self) -> Array:
         """(n,) [rad], -inf for continuous joints."""
@@ -211,7 +214,6 @@ class Machine:
             K = np.zeros((4, 4))
             K[:3, :3] = [[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]
             M[:, i] = link.T_parent_joint, link.T_parent_joint @ K, link.T_parent_joint @ K @ K
-        # Left writable: a copy in another process is, and kernels are compiled for either kind.
         return M
 
     @cached_property

@@ -26,8 +26,8 @@ def set_niceness(value: int) -> None:
 def thread_first() -> None:
     """The calling thread, from now on, before all others of its process, too: many short tasks of
     theirs would otherwise cut up each of its cycles. In real time where the system allows that
-    (needs CAP_SYS_NICE or a limit `rtprio`), else by niceness, else not at all. What it starts does
-    not inherit it.
+    (needs CAP_SYS_NICE or a limit `rtprio`), which what it starts does not inherit; else by
+    niceness, where that is allowed; else not at all.
     """
     try:
         os.sched_setscheduler(0, os.SCHED_RR | os.SCHED_RESET_ON_FORK, os.sched_param(1))

@@ -41,19 +41,9 @@ def wrenches(
                 w[b], dw[b], a[b] = 0.0, 0.0, 0.0
             else:
                 _about(axes[b], np.sin(q[i, j]), np.cos(q[i, j]), turned)
+                _carry(R, p, R0, p0, turned, above, b)
                 for r in range(3):
-                    p[b, r] = p[above, r]
                     axis[r] = 0.0
-                    for c in range(3):
-                        p[b, r] += R[above, r, c] * p0[b, c]
-                for r in range(3):
-                    for c in range(3):
-                        mixed = 0.0
-                        for s in range(3):
-                            for t in range(3):
-                                mixed += R[above, r, s] * R0[b, s, t] * turned[t, c]
-                        R[b, r, c] = mixed
-                for r in range(3):
                     for c in range(3):
                         axis[r] += R[b, r, c] * axes[b, c]
                 v, u = qd[i, j], qdd[i, j]
@@ -101,20 +91,26 @@ def body_centres(
                 R[b], p[b] = R0[b], p0[b]
             else:
                 _about(axes[b], np.sin(q[i, j]), np.cos(q[i, j]), turned)
-                for r in range(3):
-                    p[b, r] = p[above, r]
-                    for c in range(3):
-                        p[b, r] += R[above, r, c] * p0[b, c]
-                        mixed = 0.0
-                        for s in range(3):
-                            for t in range(3):
-                                mixed += R[above, r, s] * R0[b, s, t] * turned[t, c]
-                        R[b, r, c] = mixed
+                _carry(R, p, R0, p0, turned, above, b)
             for r in range(3):
                 out[b, i, r] = p[b, r]
                 for c in range(3):
                     out[b, i, r] += R[b, r, c] * coms[b, c]
     return out
+
+
+@njit(cache=True, nogil=True)
+def _carry(R: Array, p: Array, R0: Array, p0: Array, turned: Array, above: int, b: int) -> None:
+    """Place body b, turned in its own frame by (3, 3), on the body above it."""
+    for r in range(3):
+        p[b, r] = p[above, r]
+        for c in range(3):
+            p[b, r] += R[above, r, c] * p0[b, c]
+            mixed = 0.0
+            for s in range(3):
+                for t in range(3):
+                    mixed += R[above, r, s] * R0[b, s, t] * turned[t, c]
+            R[b, r, c] = mixed
 
 
 @njit(cache=True, nogil=True)
