@@ -22,6 +22,7 @@ from backend.safety.partner import Limits
 from backend.safety.people import Watch
 from backend.safety.swing_risk import Boundaries
 from backend.safety.tip_over import TipOver
+from backend.shell.aside import NICENESS, SLOW
 from backend.shell.hub import Hub
 from backend.shell.image_loops import ImageLoop, ImageMaker
 from backend.shell.image_worker import ImageWorker
@@ -37,8 +38,11 @@ if TYPE_CHECKING:
     from cockpit.views.use_case_nodes import Played
 
 MAX_HEIGHT = 50.0  # of a picked bucket tip above or below the swing joint [m]
-_LOOPS = (("images", (SUN, EXACT), "image_hz"), ("zones", (ZONE, REGIONS), "zone_hz"))
-"""Name, kinds, and which of the site's rates; each loop has a process of its own."""
+_LOOPS = (
+    ("images", (SUN, EXACT), "image_hz", NICENESS),
+    ("zones", (ZONE, REGIONS), "zone_hz", SLOW),
+)
+"""Name, kinds, which of the site's rates, and niceness; each loop has a process of its own."""
 
 ALONG_HZ = 0.5
 """How often strips along tracks are made, while somebody looks at them."""
@@ -119,11 +123,11 @@ def image_loops(site: Site, config: Config, closing: contextlib.ExitStack) -> tu
     """All loops that make images of a site, each with a process that ends with `closing`."""
     sun = SunParameters(site.sun.m, site.sun.n, site.sun.eta)
     loops = []
-    for name, kinds, rate in _LOOPS:
-        worker = ImageWorker(Recipe(config, sun, kinds))
+    for name, kinds, rate, niceness in _LOOPS:
+        worker = ImageWorker(Recipe(config, sun, kinds), niceness)
         closing.callback(worker.close)
         loops.append(ImageLoop(name, getattr(site.rates, rate), worker))
-    worker = ImageWorker(Recipe(config, sun, (AROUND,)))
+    worker = ImageWorker(Recipe(config, sun, (AROUND,)), SLOW)
     closing.callback(worker.close)
     loops.append(ImageLoop(AROUND, site.rates.zone_hz, OnceThereIs(worker, config)))
     return tuple(loops)
@@ -140,7 +144,7 @@ def along_loops(site: Site, config: Config, closing: contextlib.ExitStack) -> tu
     if not ways:
         return ()
     sun = SunParameters(site.sun.m, site.sun.n, site.sun.eta)
-    worker = ImageWorker(Recipe(config, sun, (ALONG,), ways=ways))
+    worker = ImageWorker(Recipe(config, sun, (ALONG,), ways=ways), SLOW)
     closing.callback(worker.close)
     return (ImageLoop(ALONG, ALONG_HZ, WhenAsked(worker)),)
 

@@ -13,7 +13,7 @@ from backend.spatial.types import Array, IntArray
 _NO_AXIS = 1e-9  # length below which a crossed axis gives no direction
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True)
 def lower_bound(
     ca: Array, Ra: Array, ha: Array, i: int, cb: Array, Rb: Array, hb: Array, j: int
 ) -> float:
@@ -39,7 +39,7 @@ def lower_bound(
     return np.sqrt(max(sum_a, sum_b))
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True)
 def lower_bounds(ca: Array, Ra: Array, ha: Array, cb: Array, Rb: Array, hb: Array) -> Array:
     """(n, m) `lower_bound` of all pairs [m]."""
     n, m = ca.shape[0], cb.shape[0]
@@ -50,7 +50,7 @@ def lower_bounds(ca: Array, Ra: Array, ha: Array, cb: Array, Rb: Array, hb: Arra
     return bound
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True)
 def separation(ca: Array, Ra: Array, ha: Array, cb: Array, Rb: Array, hb: Array) -> float:
     """Largest gap of two boxes along the 15 separating axes [m]; negative on overlap."""
     best = -np.inf
@@ -87,7 +87,7 @@ def separation(ca: Array, Ra: Array, ha: Array, cb: Array, Rb: Array, hb: Array)
     return best
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True)
 def separations(ca: Array, Ra: Array, ha: Array, cb: Array, Rb: Array, hb: Array) -> Array:
     """`separation` of the k-th boxes of both sets: (k,) [m]."""
     gaps = np.empty(ca.shape[0])
@@ -96,7 +96,7 @@ def separations(ca: Array, Ra: Array, ha: Array, cb: Array, Rb: Array, hb: Array
     return gaps
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True)
 def nearest_in_box(p: Array, c: Array, R: Array, h: Array, out: Array) -> float:
     """Writes the point of a box nearest to p; returns the squared distance [m^2]."""
     local = np.empty(3)
@@ -112,7 +112,7 @@ def nearest_in_box(p: Array, c: Array, R: Array, h: Array, out: Array) -> float:
     return square
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True)
 def pair_distance(
     ca: Array, Ra: Array, ha: Array, cb: Array, Rb: Array, hb: Array, points: Array
 ) -> float:
@@ -129,7 +129,7 @@ def pair_distance(
     return boxes_apart(ca, Ra, ha, cb, Rb, hb, np.empty((11, 3)), points)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True)
 def distances(
     ca: Array,
     Ra: Array,
@@ -150,7 +150,7 @@ def distances(
     return found, points
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True)
 def near_point(
     centers: Array, rotations: Array, halves: Array, point: Array, radius: float
 ) -> IntArray:

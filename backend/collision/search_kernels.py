@@ -16,7 +16,7 @@ _TOUCHING = 1e-6  # closest points nearer than this give no direction [m]
 _DEEP = 64  # of the stack; a tree is never deeper than half of it
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True)
 def search(
     kind: int,
     nodes: tuple[IntArray, Array, Array, int],
@@ -166,7 +166,7 @@ def search(
                     limit = min(limit, max(distances[link, k_most - 1], 0.0))
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True)
 def _apart(ca: Array, Ra: Array, ha: Array, cb: Array, Rb: Array, hb: Array) -> float:
     """A quick lower bound of the distance of two boxes [m]: a against what surrounds b in its
     axes, and the other way round.
@@ -186,7 +186,7 @@ def _apart(ca: Array, Ra: Array, ha: Array, cb: Array, Rb: Array, hb: Array) -> 
     return float(np.sqrt(max(sum_a, sum_b)))
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True)
 def _octant(local: Array) -> int:
     octant = 0
     for k in range(3):
@@ -195,7 +195,7 @@ def _octant(local: Array) -> int:
     return octant
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True)
 def _sides(low: Array, high: Array, c: Array, R: Array, lowest: Array, highest: Array) -> None:
     """Writes what a node reaches from and to along the axes of a box, (3,) each [m]."""
     for k in range(3):
@@ -206,7 +206,7 @@ def _sides(low: Array, high: Array, c: Array, R: Array, lowest: Array, highest: 
         lowest[k], highest[k] = along - wide, along + wide
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True)
 def _worst(low: Array, high: Array, best: Array) -> float:
     """The greatest of best (8,) among the octants that something from low to high is in: the
     closest point of the box is on the same side of each of its axes.
@@ -221,7 +221,7 @@ def _worst(low: Array, high: Array, best: Array) -> float:
     return worst
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True)
 def _insert(
     link: int,
     key: int,

@@ -17,7 +17,7 @@ CLOSE = 0.05
 itself is measured: corner to corner it is larger than the gap along every axis [m]."""
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(cache=True)  # type: ignore[untyped-decorator]
 def place(
     M: Array,
     parents: IntArray,
@@ -44,7 +44,7 @@ def place(
         i = parents[i]
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(cache=True)  # type: ignore[untyped-decorator]
 def _common(parents: IntArray, a: int, b: int) -> int:
     """The link that carries both links and is nearest to them."""
     while a != b:
@@ -55,7 +55,7 @@ def _common(parents: IntArray, a: int, b: int) -> int:
     return a
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(cache=True)  # type: ignore[untyped-decorator]
 def _spin(axis: Array, sine: float, versine: float, c: Array, R: Array) -> None:
     """Turn center c (3,) and rotation R (3, 3) about an axis (2, 3), origin and unit vector, in
     place; versine is 1 - cos of the angle.
@@ -75,7 +75,7 @@ def _spin(axis: Array, sine: float, versine: float, c: Array, R: Array) -> None:
         R[2, b] = z + sine * (u[0] * y - u[1] * x) + versine * (u[2] * along - z)
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(cache=True)  # type: ignore[untyped-decorator]
 def _copy(c: Array, R: Array, to_c: Array, to_R: Array) -> None:
     for x in range(3):
         to_c[x] = c[x]
@@ -83,7 +83,7 @@ def _copy(c: Array, R: Array, to_c: Array, to_R: Array) -> None:
             to_R[x, y] = R[x, y]
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(cache=True)  # type: ignore[untyped-decorator]
 def limits(
     q: Array, directions: Array, lower: Array, upper: Array
 ) -> tuple[Array, Array, IntArray]:
@@ -107,7 +107,7 @@ def limits(
     return ends, fastest, alone
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(cache=True)  # type: ignore[untyped-decorator]
 def axes_of(T: Array, links: IntArray, axes: Array) -> Array:
     """(joints, 2, 3) origins and unit vectors of the joints' axes at link poses T (L, 4, 4)."""
     out = np.empty((len(links), 2, 3))
@@ -121,7 +121,7 @@ def axes_of(T: Array, links: IntArray, axes: Array) -> Array:
     return out
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(cache=True)  # type: ignore[untyped-decorator]
 def rings(centers: Array, rotations: Array, halves: Array, origin: Array, axis: Array) -> Array:
     """(n, 4) what boxes cover while they turn about an axis: least and largest distance from it,
     least and largest place along it [m]. origin: a point of the axis, axis: its unit vector, (3,).
@@ -148,7 +148,7 @@ def rings(centers: Array, rotations: Array, halves: Array, origin: Array, axis: 
     return out
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(cache=True)  # type: ignore[untyped-decorator]
 def advance(
     chain: tuple[Array, IntArray, IntArray],
     links: IntArray,

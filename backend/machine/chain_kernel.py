@@ -10,7 +10,7 @@ from numba import njit
 from backend.spatial.types import Array, IntArray
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(cache=True)  # type: ignore[untyped-decorator]
 def in_parent(M: Array, joints: IntArray, q: Array, link: int, T: Array) -> None:
     """Set T (3, 4) to the link's pose in its parent, Rodrigues; M, joints as in
     Machine.link_matrices, .link_joints; q: (n,) [rad].
@@ -23,7 +23,7 @@ def in_parent(M: Array, joints: IntArray, q: Array, link: int, T: Array) -> None
             T[a, b] = M[0, link, a, b] + s * M[1, link, a, b] + v * M[2, link, a, b]
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(cache=True)  # type: ignore[untyped-decorator]
 def set_link_poses(
     M: Array, parents: IntArray, joints: IntArray, q: Array, T_root: Array, poses: Array
 ) -> None:
@@ -42,7 +42,7 @@ def set_link_poses(
             poses[i, a, 3] += above[a, 3]
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(cache=True)  # type: ignore[untyped-decorator]
 def link_poses(M: Array, parents: IntArray, joints: IntArray, q: Array, T_root: Array) -> Array:
     """(L, 4, 4), as in `set_link_poses`."""
     poses = np.zeros((len(parents), 4, 4))
@@ -51,7 +51,7 @@ def link_poses(M: Array, parents: IntArray, joints: IntArray, q: Array, T_root: 
     return poses
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(cache=True)  # type: ignore[untyped-decorator]
 def set_placed(
     bodies: tuple[Array, Array, Array], links: IntArray, poses: Array, centers: Array, R: Array
 ) -> None:
@@ -71,7 +71,7 @@ def set_placed(
                 )
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(cache=True)  # type: ignore[untyped-decorator]
 def placed(
     bodies: tuple[Array, Array, Array], links: IntArray, poses: Array
 ) -> tuple[Array, Array]:
@@ -82,7 +82,7 @@ def placed(
     return centers, R
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(cache=True)  # type: ignore[untyped-decorator]
 def point_jacobians(
     poses: Array, links: IntArray, axes: Array, moved: Array, bodies: IntArray, points: Array
 ) -> Array:

@@ -8,7 +8,7 @@ from numba import njit
 from backend.spatial.types import Array, IntArray
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True)
 def convex_hull(points: Array, order: IntArray) -> Array:
     """Andrew's monotone chain: hull (k, 2) of points (n, 2), counter-clockwise.
 

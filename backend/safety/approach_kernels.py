@@ -11,19 +11,19 @@ from backend.spatial.types import Array, BoolArray, IntArray
 NEAR = 1.0  # gaps below this are measured exactly [m]
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True)
 def _cross(a: Array, b: Array, out: Array) -> None:
     out[0] = a[1] * b[2] - a[2] * b[1]
     out[1] = a[2] * b[0] - a[0] * b[2]
     out[2] = a[0] * b[1] - a[1] * b[0]
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True)
 def _dot(a: Array, b: Array) -> float:
     return float(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True)
 def _corner(c: Array, R: Array, h: Array, which: int, out: Array) -> None:
     for x in range(3):
         out[x] = c[x]
@@ -31,7 +31,7 @@ def _corner(c: Array, R: Array, h: Array, which: int, out: Array) -> None:
             out[x] += R[x, k] * (h[k] if which >> k & 1 else -h[k])
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True)
 def _closing(
     n: Array, c: Array, R: Array, h: Array, v: Array, w: Array, horizons: Array
 ) -> tuple[float, float]:
@@ -57,7 +57,7 @@ def _closing(
     return top, speed
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True)
 def rows(
     own: tuple[Array, Array, Array],
     other: tuple[Array, Array, Array],
@@ -149,7 +149,7 @@ def rows(
     )
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True)
 def _motions(
     x: Array,
     moves: BoolArray,
@@ -200,7 +200,7 @@ def _motions(
         K[n, n + 1, d] = K[n + 1, n, d] = mixed
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True)
 def _most(J: Array, K: Array, reach: Array) -> float:
     """The farthest that a corner can come within `reach` of all motions [m]."""
     most = 0.0

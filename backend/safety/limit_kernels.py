@@ -17,18 +17,18 @@ BISECTIONS = 12
 STILL = 0.01  # slower motions are taken for standing [rad/s, m/s]
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True)
 def _used(c: float, b: float, s: float) -> float:
     """Room used by a motion of s >= 0, at least 0 [m]."""
     return max(c * s + 0.5 * b * s * s, 0.0)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True)
 def _slope(value: float) -> float:
     return 0.0 if 0.0 < value < APPROACHES else value
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True)
 def _farthest(c: float, b: float, room: float) -> float:
     """The greatest s with c s + 1/2 b s^2 <= room, for every smaller s, too."""
     room = max(room, 0.0)
@@ -38,14 +38,14 @@ def _farthest(c: float, b: float, room: float) -> float:
     return (root - c) / b if b > 0.0 else np.inf
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True)
 def _speed(s: float, T: float, a: float) -> float:
     if s <= 0.0:
         return 0.0
     return 2.0 * s / (T + np.sqrt(T * T + 2.0 * s / a)) if s < np.inf else np.inf
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True)
 def _beside(v: float, c: float, b: float, room: float, w: float, T: float, a: float) -> float:
     """The greatest speed, at most v, of a motion beside a partner that closes with w [m/s]:
     what it uses until it stands, and w (T + v / a), fit into the room. Rounded down.
@@ -63,7 +63,7 @@ def _beside(v: float, c: float, b: float, room: float, w: float, T: float, a: fl
     return low
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True)
 def _coasting(slope: Array, bend: Array, rates: Array, T: Array, a: Array, wish: Array) -> Array:
     """(m,) room that the present motions use until they stand, beyond what `wish` asks for [m]."""
     used = np.zeros(len(rates))
@@ -80,7 +80,7 @@ def _coasting(slope: Array, bend: Array, rates: Array, T: Array, a: Array, wish:
     return used
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True)
 def single(
     room: Array,
     slope: Array,
@@ -120,7 +120,7 @@ def single(
     return speed, row
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True)
 def _part(linear: float, square: float, room: float) -> float:
     """The greatest q in 0..1 with q linear + q^2 square <= room."""
     if linear + square <= room:
@@ -130,7 +130,7 @@ def _part(linear: float, square: float, room: float) -> float:
     return 2.0 * room / (linear + np.sqrt(linear * linear + 4.0 * square * room))
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True)
 def together(
     wish: Array,
     room: Array,

@@ -11,7 +11,7 @@ _TURN = 2.0 * np.pi
 _LARGEST = 1e9  # [m]
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True)
 def gaps(
     at: Array,
     angle: Array,

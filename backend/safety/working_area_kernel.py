@@ -16,7 +16,7 @@ from backend.spatial.types import Array, IntArray
 FULL = 2.0 * math.pi
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True)
 def _cosine(low: float, high: float) -> tuple[float, float]:
     """Lowest and highest cosine within low to high [rad]."""
     a, b = math.cos(low), math.cos(high)
@@ -28,7 +28,7 @@ def _cosine(low: float, high: float) -> tuple[float, float]:
     return least, most
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True)
 def half_width(near: float, far: float, width: float, body: float) -> float:
     """How far to one side of straight ahead anything is seen that is outside a disc [rad].
 
@@ -42,7 +42,7 @@ def half_width(near: float, far: float, width: float, body: float) -> float:
     return math.atan2(most, max(near, math.sqrt(max(body * body - most * most, 0.0))))
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True)
 def intervals(
     q: Array, rates: Array, sigma_q: float, sigma_rate: float, lower: Array, upper: Array, dt: float
 ) -> Array:
@@ -63,7 +63,7 @@ def intervals(
     return out
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True)
 def sectors(
     pivots: Array,
     vectors: Array,
@@ -128,7 +128,7 @@ def sectors(
     return out
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True)
 def narrowest(areas: Array, center: Array, places: Array, radius: Array) -> IntArray:
     """(k,) 1 + the last of the areas that discs on the ground touch, 0 none.
 

@@ -13,6 +13,8 @@ from backend.shell.priority import set_niceness
 
 NICENESS = 2
 """The fast loop goes before images when processors are short."""
+SLOW = 6
+"""And images made many times a second before those that take longer and are made less often."""
 
 Question = TypeVar("Question")
 Answer = TypeVar("Answer")

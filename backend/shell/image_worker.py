@@ -6,7 +6,7 @@ from collections.abc import Callable
 from functools import partial
 
 from backend.pipeline.records import Snapshot
-from backend.shell.aside import Aside, WorkerGone
+from backend.shell.aside import NICENESS, Aside, WorkerGone
 from backend.shell.kinds import Made, Recipe, Wishes, make_images
 
 __all__ = ["ImageWorker", "WorkerGone"]
@@ -17,8 +17,8 @@ _Question = tuple[Snapshot, Wishes]
 class ImageWorker(Aside[_Question, list[Made]]):
     """Asks a process of its own for the images of a recipe. One caller at a time."""
 
-    def __init__(self, recipe: Recipe) -> None:
-        super().__init__(partial(_begin, recipe), "makes images")
+    def __init__(self, recipe: Recipe, niceness: int = NICENESS) -> None:
+        super().__init__(partial(_begin, recipe), "makes images", niceness)
 
     def make(self, snapshot: Snapshot, wishes: Wishes) -> list[Made]:
         """Blocks until all images are made. Raises WorkerGone, or RuntimeError with what failed."""

@@ -13,7 +13,7 @@ CENTRE, MAYBE, WHOLE = 1, 2, 4
 _DEEPEST = 64  # halvings of a grid on top of each other
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True)
 def least_moment(
     tree: tuple[IntArray, IntArray],
     frames: tuple[Array, Array, Array],
@@ -68,7 +68,7 @@ def least_moment(
     return least
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True)
 def tipping_postures(
     tree: tuple[IntArray, IntArray],
     frames: tuple[Array, Array, Array],
@@ -86,7 +86,7 @@ def tipping_postures(
     return out
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True)
 def tipping_cells(
     tree: tuple[IntArray, IntArray],
     frames: tuple[Array, Array, Array],

@@ -8,7 +8,7 @@ from numba import njit
 from backend.spatial.types import Array, IntArray
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True)
 def wrenches(
     tree: tuple[IntArray, IntArray],
     frames: tuple[Array, Array, Array],
@@ -74,7 +74,7 @@ def wrenches(
     return out
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True)
 def body_centres(
     tree: tuple[IntArray, IntArray], frames: tuple[Array, Array, Array], coms: Array, q: Array
 ) -> Array:
@@ -99,7 +99,7 @@ def body_centres(
     return out
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True)
 def _carry(R: Array, p: Array, R0: Array, p0: Array, turned: Array, above: int, b: int) -> None:
     """Place body b, turned in its own frame by (3, 3), on the body above it."""
     for r in range(3):
@@ -113,14 +113,14 @@ def _carry(R: Array, p: Array, R0: Array, p0: Array, turned: Array, above: int, 
             R[b, r, c] = mixed
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True)
 def _cross(
     a0: float, a1: float, a2: float, b0: float, b1: float, b2: float
 ) -> tuple[float, float, float]:
     return a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True)
 def _turned(R: Array, x: float, y: float, z: float) -> tuple[float, float, float]:
     return (
         R[0, 0] * x + R[0, 1] * y + R[0, 2] * z,
@@ -129,7 +129,7 @@ def _turned(R: Array, x: float, y: float, z: float) -> tuple[float, float, float
     )
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True)
 def _carried(w: Array, dw: Array, x: float, y: float, z: float) -> tuple[float, float, float]:
     """dw x r + w x (w x r)."""
     vx, vy, vz = _cross(w[0], w[1], w[2], x, y, z)
@@ -138,7 +138,7 @@ def _carried(w: Array, dw: Array, x: float, y: float, z: float) -> tuple[float, 
     return cx + tx, cy + ty, cz + tz
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True)
 def _spun(R: Array, tensor: Array, w: Array, dw: Array) -> tuple[float, float, float]:
     """I dw + w x I w, of a tensor in the frame R."""
     turned = R.T
@@ -150,7 +150,7 @@ def _spun(R: Array, tensor: Array, w: Array, dw: Array) -> tuple[float, float, f
     return cx + jx, cy + jy, cz + jz
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True)
 def _about(axis: Array, s: float, c: float, out: Array) -> None:
     """Rodrigues' rotation into out (3, 3)."""
     v = 1.0 - c
