@@ -50,21 +50,22 @@ def cspace_rows() -> list[BenchRow]:
 def _image_rows(
     scene: BenchScene, model: ArmModel, shape: tuple[int, int, int, int], target: float, count: int
 ) -> list[BenchRow]:
-    """The exact image's time as a multiple of filling the same bits, in turns.
+    """The exact image's time as a multiple of filling the same memory, in turns.
 
-    Three kinds of memory: the same again and again, as much of it as fits in the processor's
-    caches; known to the system, but in no cache, which takes turns among more than the caches hold;
-    and new, which the system has to find first, as it has to for a new image.
+    Three kinds of it: the same again and again, as much of it as fits in the processor's caches;
+    known to the system, but in no cache, which takes turns among more than the caches hold; and
+    new, which the system has to find first.
     """
     grid = joint_grid(scene.machine, shape)
     bits = blocked(model, grid, scene.partner)
     known = [np.zeros_like(bits) for _ in range(2 + 2 * last_cache() // bits.nbytes)]
     for memory in known:
         memory.fill(1)  # mapped from now on
-    ours, over, again, cold, new = _in_turns(
+    same, over, ours, again, cold, new = _in_turns(
         count,
-        lambda _: blocked(model, grid, scene.partner),
+        lambda _: blocked(model, grid, scene.partner, out=known[0]),
         lambda k: blocked(model, grid, scene.partner, out=known[k % len(known)]),
+        lambda _: blocked(model, grid, scene.partner),
         lambda _: known[0].fill(0),
         lambda k: known[(k + len(known) // 2) % len(known)].fill(0),
         lambda _: np.empty_like(bits).fill(0),
@@ -73,17 +74,17 @@ def _image_rows(
     rows = [
         BenchRow(
             name=name,
-            value=float(np.median(1e3 * ours)),
+            value=float(np.median(1e3 * same)),
             unit="ms",
-            spread=_spread(1e3 * ours),
+            spread=_spread(1e3 * same),
             peer="memset",
             peer_value=float(np.median(1e3 * again)),
         )
     ]
     for what, times, peer, limit in (
-        ("of memset", ours, again, target),
+        ("of memset", same, again, target),
         ("written over known memory out of cache, of memset of such", over, cold, None),
-        ("of memset of a new image, as ours is", ours, new, None),
+        ("in new memory, of memset of such", ours, new, None),
     ):
         multiples = times / np.median(peer)
         rows.append(

@@ -103,10 +103,12 @@ def blocked(
     axes = _axes(model, grid, kind, None)
     rows = out.reshape(grid.shape[0], -1, grid.words)
 
+    next_swing = np.zeros(1, dtype=np.int64)
+
     def fill(first: int, every: int) -> None:
         image_kernel(
             model.chain, _profiles(model, kind), model.tracks, model.upper, boxes, axes, kind,
-            standing, fresh, first, every, rows,
+            standing, fresh, next_swing, rows,
         )  # fmt: skip
 
     _shared(fill, grid.shape[0])

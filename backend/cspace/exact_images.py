@@ -1,7 +1,7 @@
 """Whole images, compiled: of all swings against obstacles, and against the machine itself.
 
-Without the GIL, so that threads can share the swings: each takes every so many, since swings side
-by side cost about the same.
+Without the GIL, so that threads can share the swings: each takes the next one, since some cost many
+times as much as others.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from backend.cspace.exact_levels import COUNT, HALF, START, STEP, levels
 from backend.cspace.exact_slices import placed
 from backend.cspace.exact_upper import turned_touches
 from backend.cspace.planar_arm import Profiles
+from backend.cspace.taking_turns import taken
 from backend.spatial.types import AnyArray, Array, BoolArray, IntArray
 
 
@@ -84,12 +85,11 @@ def image_kernel(
     kind: int,
     standing: bool,
     fresh: bool,
-    first: int,
-    every: int,
+    next_swing: IntArray,
     out: AnyArray,
 ) -> None:
-    """Fill the swings first, first + every, ... of out (swing, boom * stick, words) with the
-    blocked cells. fresh: out is all 0.
+    """Fill out (swing, boom * stick, words) with the blocked cells, together with all who are given
+    the same next_swing (1,), 0 before. fresh: out is all 0.
 
     boxes: obstacles in the root frame, centers (m, 3), rotations (m, 3, 3), halves (m, 3); axes:
     (4, 4) see exact_levels; standing: the tracks stand on the obstacles, which does not count.
@@ -97,12 +97,15 @@ def image_kernel(
     full = full_words(int(axes[3, COUNT]))
     around = placed(boxes, chain.T_arm_root)
     if not standing and _touches(tracks, around, 0.0, 0.0, kind):
-        for s in range(first, len(out), every):
+        s = taken(next_swing)
+        while s < len(out):
             out[s] = full
+            s = taken(next_swing)
         return
     level = levels(chain.links, axes, kind)
     pairs = np.ones((len(body.group), len(boxes[0])), np.bool_)
-    for s in range(first, len(out), every):
+    s = taken(next_swing)
+    while s < len(out):
         angle = axes[0, START] + s * axes[0, STEP]
         if _touches(upper, around, angle, axes[0, HALF], kind):
             out[s] = full
@@ -111,6 +114,7 @@ def image_kernel(
                 out[s] = 0
             there = placed(boxes, _turned(chain.T_arm_root, angle))
             swing_block(chain, body, there, pairs, level, axes[0, HALF], out[s])
+        s = taken(next_swing)
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
@@ -124,7 +128,7 @@ def self_kernel(
     every: int,
     out: AnyArray,
 ) -> None:
-    """The same where the machine touches itself."""
+    """The same where the machine touches itself, for the swings first, first + every, ..."""
     cells = axes[:, COUNT].astype(np.int64)
     full = full_words(cells[3])
     for p in range(len(itself.held)):

@@ -18,9 +18,29 @@ from backend.cspace.exact_boxes import gap
 from backend.cspace.exact_levels import EXACT, RUN, Level
 from backend.cspace.exact_slices import slices
 from backend.cspace.planar_arm import Profiles
-from backend.cspace.rows import ALL, Polygons, rectangle_distance, touched
-from backend.cspace.rows_batch import SIZE, Batch, new_batch, touched_rows
-from backend.spatial.types import AnyArray, Array, BoolArray
+from backend.cspace.rows import ALL, Polygons, touched
+from backend.cspace.rows_batch import (
+    Batch,
+    Sizes,
+    cells_of,
+    new_batch,
+    set_body,
+    set_polygon,
+    touched_rows,
+)
+from backend.cspace.rows_vector import (
+    BLOCKED,
+    DOUBT,
+    LEVER_X,
+    LEVER_Z,
+    MARGIN,
+    ORIGIN,
+    SIZE,
+    WORD,
+    X,
+    Z,
+)
+from backend.spatial.types import AnyArray, Array, BoolArray, IntArray
 
 
 class Chain(NamedTuple):
@@ -90,18 +110,20 @@ def _keep_box(
     """Clear the bits of row r of the batch in which the box itself does not touch obstacle j; those
     of `row` are known already.
     """
+    px, pz, origin = batch.d[X + r], batch.d[Z + r], batch.d[ORIGIN + r]
     for w in range(len(row)):
-        batch.blocked[w, r] &= full[w] & ~row[w]
+        bits = batch.w[w * WORD + BLOCKED + r] & full[w] & ~row[w]
         for bit in range(64):
-            if not (batch.blocked[w, r] >> np.uint64(bit)) & np.uint64(1):
+            if not (bits >> np.uint64(bit)) & np.uint64(1):
                 continue
-            angle = batch.origin[r] + (64 * w + bit) * level.step
-            if not _box_touches(chain, group, b, boxes, j, batch.x[r], batch.z[r], angle):
-                batch.blocked[w, r] &= ~(np.uint64(1) << np.uint64(bit))
+            angle = origin + (64 * w + bit) * level.step
+            if not _box_touches(chain, group, b, boxes, j, px, pz, angle):
+                bits &= ~(np.uint64(1) << np.uint64(bit))
+        batch.w[w * WORD + BLOCKED + r] = bits
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _finish(
+def _decide(
     chain: Chain,
     group: int,
     b: int,
@@ -113,26 +135,77 @@ def _finish(
     batch: Batch,
     count: int,
     full: AnyArray,
-    done: BoolArray,
     out: AnyArray,
 ) -> None:
-    """Write the rows of a batch to out (m, words); those that are full now are done."""
-    count = touched_rows(body, b, polygons, p, level, batch, count, full)
+    """Decide what is in doubt in the first `count` rows of a batch, or a box that is no prism."""
+    d, words, size = batch.d, batch.w, len(full)
     for r in range(count):
-        row = out[batch.place[r]]
-        if batch.doubt[r] < 0.0:
-            batch.blocked[:, r] = 0
+        if batch.s[DOUBT + r] < 0.0:
+            sure = np.zeros(size, np.uint64)
             touched(
-                body, b, polygons, p, batch.x[r], batch.z[r], batch.origin[r], level.step,
-                level.cells, batch.margin[r], level.turn, batch.blocked[:, r],
+                body, b, polygons, p, d[X + r], d[Z + r], d[ORIGIN + r], level.step,
+                level.cells, d[MARGIN + r], level.turn, sure,
             )  # fmt: skip
+            for w in range(size):
+                words[w * WORD + BLOCKED + r] = sure[w]
         if level.kind == EXACT and chain.askew[b]:
+            row = out[batch.place[r]]
             _keep_box(chain, group, b, boxes, polygons.obstacle[p], level, batch, r, full, row)
-        every = True
-        for w in range(len(row)):
-            row[w] |= batch.blocked[w, r] & full[w]
-            every = every and row[w] == full[w]
-        done[batch.place[r]] = every
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _doubted(s: AnyArray, count: int) -> bool:
+    some = False
+    for r in range(count):
+        some = some or s[DOUBT + r] < 0.0
+    return some
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _write(
+    words: AnyArray, place: IntArray, count: int, full: AnyArray, done: BoolArray, out: AnyArray
+) -> None:
+    """Add BLOCKED of the first `count` rows to out (m, words); those that are full now are done."""
+    for r in range(count):
+        m, every = place[r], True
+        for w in range(len(full)):
+            bits = out[m, w] | (words[w * WORD + BLOCKED + r] & full[w])
+            out[m, w] = bits
+            every = every and bits == full[w]
+        done[m] = every
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _gather(
+    x: Array, z: Array, origin: Array, margin: Array, lever_x: Array, lever_z: Array,
+    runs: tuple[Array, Array], around: tuple[float, float, float, float], reach: float,
+    widest: float, done: BoolArray, m: int, d: Array, place: IntArray,
+) -> tuple[int, int]:  # fmt: skip
+    """Fill a batch with the rows from m on, but for those `done`, whose pivots are within reach of
+    the rectangle `around`: left, below, right, above; how many, and where to go on. See Level.
+    """
+    left, below, right, above = around
+    low, high = runs
+    count, within, levers = 0, reach + widest, len(lever_x) > 0
+    while m < len(x) and count < SIZE:
+        if m % RUN == 0:
+            run = m // RUN
+            dx = max(left - high[run, 0], 0.0, low[run, 0] - right)
+            dz = max(below - high[run, 1], 0.0, low[run, 1] - above)
+            if dx * dx + dz * dz > within * within:
+                m += RUN
+                continue
+        px, pz, near = x[m], z[m], reach + max(margin[m], 0.0)
+        dx = max(max(left - px, px - right), 0.0)
+        dz = max(max(below - pz, pz - above), 0.0)
+        if dx * dx + dz * dz <= near * near and not done[m]:
+            d[X + count], d[Z + count], place[count] = px, pz, m
+            d[ORIGIN + count], d[MARGIN + count] = origin[m], margin[m]
+            if levers:
+                d[LEVER_X + count], d[LEVER_Z + count] = lever_x[m], lever_z[m]
+            count += 1
+        m += 1
+    return count, m
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
@@ -152,47 +225,42 @@ def _rows(
     """Set the bits of out (m, words) that the bodies of the group block, but for rows `done`; rows
     that get full are done, too.
     """
+    # Arrays are taken out of tuples before loops: each time that is done, their uses are counted.
+    d, singles, words, place = batch.d, batch.s, batch.w, batch.place
+    xs, zs, margins, origins = level.x, level.z, level.margin, level.origin
+    lever_x, lever_z, runs = level.lever_x, level.lever_z, (level.low, level.high)
+    groups, sides, slabs = body.group, body.sides, body.slab
+    of_slab, obstacles, lows, highs = polygons.slab, polygons.obstacle, polygons.low, polygons.high
+    cells = cells_of(level)
     for turn in range(2):
-        for b in range(len(body.group)):
+        for b in range(len(groups)):
             # Boxes that are not prisms are dear: they come last, and only for what is still free.
             late = level.kind == EXACT and chain.askew[b]
-            if body.group[b] != group or body.sides[b] == 0 or late != (turn == 1):
+            if groups[b] != group or sides[b] == 0 or late != (turn == 1):
                 continue
-            within = body.reach[b] + level.widest
-            for p in range(len(polygons.slab)):
-                if polygons.slab[p] != body.slab[b] or not pairs[b, polygons.obstacle[p]]:
+            set_body(batch, body, b)
+            reach, depth = body.reach[b], body.depth[b]
+            for p in range(len(of_slab)):
+                if of_slab[p] != slabs[b] or not pairs[b, obstacles[p]]:
                     continue
-                low, high = polygons.low[p], polygons.high[p]
-                count = 0
-                for run in range(len(level.low)):
-                    dx = max(low[0] - level.high[run, 0], 0.0, level.low[run, 0] - high[0])
-                    dz = max(low[1] - level.high[run, 1], 0.0, level.low[run, 1] - high[1])
-                    if dx * dx + dz * dz > within * within:
-                        continue
-                    for m in range(run * RUN, min(run * RUN + RUN, len(level.x))):
-                        if done[m]:
-                            continue
-                        x, z = level.x[m], level.z[m]
-                        near = body.reach[b] + max(level.margin[m], 0.0)
-                        if rectangle_distance(low, high, x, z) > near * near:
-                            continue
-                        batch.x[count], batch.z[count], batch.place[count] = x, z, m
-                        batch.origin[count], batch.margin[count] = level.origin[m], level.margin[m]
-                        if level.kind != EXACT:
-                            batch.lever_x[count] = level.lever_x[m]
-                            batch.lever_z[count] = level.lever_z[m]
-                        count += 1
-                        if count == SIZE:
-                            _finish(
-                                chain, group, b, body, polygons, p, boxes, level, batch,
-                                count, full, done, out,
-                            )  # fmt: skip
-                            count = 0
-                if count > 0:
-                    _finish(
-                        chain, group, b, body, polygons, p, boxes, level, batch, count, full,
-                        done, out,
+                set_polygon(batch, polygons, p)
+                sizes = Sizes(sides[b], depth, reach, polygons.sides[p], len(full))
+                around = (lows[p, 0], lows[p, 1], highs[p, 0], highs[p, 1])
+                m = 0
+                while m < len(xs):
+                    count, m = _gather(
+                        xs, zs, origins, margins, lever_x, lever_z, runs, around, reach,
+                        level.widest, done, m, d, place,
                     )  # fmt: skip
+                    if count == 0:
+                        continue
+                    count = touched_rows(sizes, cells, batch, count, full)
+                    if late or _doubted(singles, count):
+                        _decide(
+                            chain, group, b, body, polygons, p, boxes, level, batch, count, full,
+                            out,
+                        )  # fmt: skip
+                    _write(words, place, count, full, done, out)
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
@@ -202,8 +270,10 @@ def _pass_on(
     """Block the `share` rows of out (m, words) behind each of the first n bits set in row."""
     for i in range(n):
         if (row[i // 64] >> np.uint64(i % 64)) & np.uint64(1):
-            out[i * share : (i + 1) * share] = full
-            done[i * share : (i + 1) * share] = True
+            for m in range(i * share, (i + 1) * share):
+                done[m] = True
+                for w in range(len(full)):
+                    out[m, w] = full[w]
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
@@ -224,7 +294,7 @@ def swing_block(
     if len(polygons.slab) == 0:
         return
     full1, full2, full3 = full_words(boom.cells), full_words(stick.cells), full_words(bucket.cells)
-    corners = polygons.x.shape[1]
+    corners = max(polygons.x.shape[1], body.radius.shape[1])
     row1, done1 = np.zeros((1, len(full1)), np.uint64), np.zeros(1, np.bool_)
     _rows(
         chain, 0, body, polygons, pairs, boxes, boom, done1, new_batch(len(full1), corners),

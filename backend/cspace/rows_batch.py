@@ -2,8 +2,8 @@
 
 The same arcs as in `rows`, one step at a time for all rows. Edges and corners that matter to no row
 of the batch are left out; and what lies beyond an edge of the body is one arc between two tangents
-of the polygon, which needs no angle for each corner. Angles are polynomials: where an arc ends too
-near to a cell to tell on which side, the row is in doubt and `rows` decides.
+of the polygon, which needs no angle for each corner. Angles are polynomials in single precision:
+where an arc ends too near to a cell to tell on which side, the row is in doubt and `rows` decides.
 """
 
 from __future__ import annotations
@@ -17,258 +17,330 @@ from numba import njit
 from backend.cspace.exact_levels import EXACT, Level
 from backend.cspace.planar_arm import Profiles
 from backend.cspace.rows import ALL, SLACK, Polygons
-from backend.cspace.rows_angles import ERROR
+from backend.cspace.rows_angles import ERROR, HALF_TURN
 from backend.cspace.rows_vector import (
-    along,
-    arcs_before_line,
-    arcs_between,
-    arcs_of_corner,
-    aside,
+    AWAY,
+    BASE,
+    BLOCKED,
+    CORNERS,
+    DOUBT,
+    END,
+    LEVER_X,
+    LEVER_Z,
+    MARGIN,
+    MASK,
+    NEAREST,
+    ORIGIN,
+    SIZE,
+    START,
+    UX,
+    VX,
+    WORD,
+    X,
+    Z,
+    arcs,
     bearings,
+    before_edge,
+    before_line,
+    between,
     both,
+    clear_bits,
+    corner_directions,
+    corner_distances,
+    corner_places,
+    extremes,
+    fill,
     from_limit,
-    greatest,
-    greatest_below,
-    higher,
-    inverses,
-    least,
-    lower,
-    mark,
+    from_middle,
+    lines,
+    lines_within,
     narrow,
-    offsets,
-    offsets_within,
-    without,
+    nearer,
+    remaining,
+    set_bits,
+    towards,
 )
 from backend.spatial.types import AnyArray, Array, IntArray
 
-SIZE = 128
-"""Rows of a batch: what they need stays in the cache."""
 _LANES = 16
+ROUNDING = 5.0 * 2.0**-24
+"""Places on the circle are rounded by less than this share of it."""
 
 
 class Batch(NamedTuple):
-    """Rows of one body and one polygon, and room to work.
-
-    x, z: (m,) pivots [m]; origin: (m,) angles of the first cells [rad]; margin: (m,) how far the
-    pivots can be from there [m]; lever_x, lever_z: (m,) see Level; place: (m,) which rows of the
-    image they are; blocked, mask: (words, m); doubt: (m,) distance of an arc's end from a cell, in
-    cells; work: (9, m); corners: (2, v, m) one over their distances, directions.
+    """Rows of one body and one polygon, and room to work, see rows_vector: doubles d, singles s and
+    words w. place: (SIZE,) which rows of the image they are; shape: (10, v) of the body its
+    corners' radius and bearing, its edges' offset and normal, see Profiles; then of the polygon x,
+    z, normal_x, normal_z, offset, bearing, see Polygons.
     """
 
-    x: Array
-    z: Array
-    origin: Array
-    margin: Array
-    lever_x: Array
-    lever_z: Array
+    d: Array
+    s: AnyArray
+    w: AnyArray
     place: IntArray
-    blocked: AnyArray
-    mask: AnyArray
-    doubt: Array
-    work: Array
-    corners: Array
+    shape: Array
+
+
+class Sizes(NamedTuple):
+    """Of a body its corners, depth and reach, see Profiles; of a polygon its corners; words of a
+    row. Arrays that are passed on are counted each time, which takes long: there are none here.
+    """
+
+    sides: int
+    depth: float
+    reach: float
+    edges: int
+    words: int
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def new_batch(words: int, corners: int) -> Batch:
-    """An empty batch for rows of `words` and polygons of up to `corners`."""
+    """An empty batch for rows of `words`, and bodies and polygons of up to `corners`."""
     return Batch(
-        np.empty(SIZE), np.empty(SIZE), np.empty(SIZE), np.empty(SIZE), np.zeros(SIZE),
-        np.zeros(SIZE), np.empty(SIZE, np.int64), np.empty((words, SIZE), np.uint64),
-        np.empty((words, SIZE), np.uint64), np.empty(SIZE), np.empty((9, SIZE)),
-        np.empty((2, corners, SIZE)),
+        np.zeros(AWAY + corners * SIZE), np.empty(CORNERS + 2 * corners * SIZE, np.float32),
+        np.empty(words * WORD, np.uint64), np.empty(SIZE, np.int64), np.empty((10, corners)),
     )  # fmt: skip
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def touched_rows(
-    body: Profiles,
-    b: int,
-    polygons: Polygons,
-    k: int,
-    level: Level,
-    batch: Batch,
-    count: int,
-    full: AnyArray,
-) -> int:
-    """Set batch.blocked to the cells where body b is not apart from polygon k, and batch.doubt to
-    below 0 where that is not sure. Rows with none are dropped from the first `count`; how many are
-    left. full: (words,) the cells that count.
+def set_body(batch: Batch, body: Profiles, b: int) -> None:
+    """Rows are of body b from now on."""
+    shape = batch.shape
+    for v in range(body.sides[b]):
+        shape[0, v], shape[1, v] = body.radius[b, v], body.bearing[b, v]
+        shape[2, v], shape[3, v] = body.offset[b, v], body.normal[b, v]
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def set_polygon(batch: Batch, polygons: Polygons, k: int) -> None:
+    """And against polygon k."""
+    shape = batch.shape
+    for v in range(polygons.sides[k]):
+        shape[4, v], shape[5, v] = polygons.x[k, v], polygons.z[k, v]
+        shape[6, v], shape[7, v] = polygons.normal_x[k, v], polygons.normal_z[k, v]
+        shape[8, v], shape[9, v] = polygons.offset[k, v], polygons.bearing[k, v]
+
+
+class Cells(NamedTuple):
+    """Rows as places on a circle, in cells.
+
+    scale: cells for an angle, below 0 where the rows run the other way; size: of that; period: of
+    the circle; low, high: first and last cell, the one in the middle being 0; turn, step: see Level
+    [rad]; again: whether half a turn may come in at both ends of a row; close: an end of an arc
+    that is nearer to a cell may be on its other side; moves: kind, boom_x, boom_z, boom, stick and
+    bend of the level.
     """
-    close = ERROR / abs(level.step)
-    n = _fill(batch, count)
-    batch.blocked[:, :n] = ALL
-    batch.doubt[:n] = math.inf
-    batch.work[0, :n] = math.inf
-    front = _beyond_polygon(body, b, polygons, k, level, batch, n)
-    count = _kept(batch, count, full, close)
+
+    scale: float
+    size: float
+    period: float
+    low: float
+    high: float
+    turn: float
+    step: float
+    again: bool
+    close: float
+    moves: tuple[int, float, float, float, float, float]
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def cells_of(level: Level) -> Cells:
+    """The rows of a level."""
+    scale = 1.0 / level.step
+    size, middle = abs(scale), float(level.cells // 2)
+    period = 2.0 * math.pi * size
+    widest = (0.5 * math.pi + abs(level.turn) + 10.0 * ERROR) * size
+    return Cells(
+        scale, size, period, -middle, level.cells - 1.0 - middle, level.turn, level.step,
+        widest + middle > 0.5 * period - 0.1, ERROR * size + ROUNDING * period,
+        (level.kind, level.boom_x, level.boom_z, level.boom, level.stick, level.bend),
+    )  # fmt: skip
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def touched_rows(sizes: Sizes, cells: Cells, batch: Batch, count: int, full: AnyArray) -> int:
+    """Set BLOCKED to the cells where the body is not apart from the polygon, and DOUBT to below 0
+    where that is not sure. Rows with none are dropped from the first `count`; how many are left.
+    full: (words,) the cells that count.
+    """
+    d, s, w = batch.d, batch.s, batch.w
+    words = sizes.words
+    n = _fill(d, count)
+    for word in range(words):
+        fill(w, word * WORD + BLOCKED, n, ALL)
+    fill(s, DOUBT, n, np.float32(math.inf))
+    fill(d, NEAREST, n, math.inf)
+    front = _beyond_polygon(sizes, cells, d, s, w, batch.shape, n)
+    count = _kept(d, s, w, batch.place, count, full, cells.close)
     if count == 0:
         return 0
-    _beyond_body(body, b, polygons, k, level, batch, _fill(batch, count), front)
-    nearest, inside = batch.work[0], body.depth[b] <= 0.0
+    _beyond_body(sizes, cells, d, s, w, batch.shape, _fill(d, count), front)
+    inside, reach, close = sizes.depth <= 0.0, sizes.reach, np.float32(cells.close)
     for r in range(count):
-        within = inside and nearest[r] >= 0.0  # the pivot lies in both
-        if within or nearest[r] < -body.reach[b]:
-            batch.doubt[r] = math.inf
-            batch.blocked[:, r] = ALL if within else np.uint64(0)
-        batch.doubt[r] -= close
+        nearest = d[NEAREST + r]
+        within = inside and nearest >= 0.0  # the pivot lies in both
+        if within or nearest < -reach:
+            s[DOUBT + r] = np.float32(math.inf)
+            for word in range(words):
+                w[word * WORD + BLOCKED + r] = ALL if within else np.uint64(0)
+        s[DOUBT + r] -= close
     return count
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _kept(batch: Batch, count: int, full: AnyArray, close: float) -> int:
+def _kept(
+    d: Array,
+    s: AnyArray,
+    w: AnyArray,
+    place: IntArray,
+    count: int,
+    full: AnyArray,
+    close: float,
+) -> int:
     """Move the rows in which something may still be blocked to the front; how many."""
-    kept = 0
+    words, kept = len(full), 0
     for r in range(count):
-        some = batch.doubt[r] < close
-        for w in range(len(full)):
-            some = some or batch.blocked[w, r] & full[w] != 0
+        some = s[DOUBT + r] < close
+        for word in range(words):
+            some = some or w[word * WORD + BLOCKED + r] & full[word] != 0
         if not some:
             continue
-        batch.x[kept], batch.z[kept], batch.place[kept] = batch.x[r], batch.z[r], batch.place[r]
-        batch.origin[kept], batch.margin[kept] = batch.origin[r], batch.margin[r]
-        batch.lever_x[kept], batch.lever_z[kept] = batch.lever_x[r], batch.lever_z[r]
-        batch.doubt[kept], batch.work[0, kept] = batch.doubt[r], batch.work[0, r]
-        for w in range(len(full)):
-            batch.blocked[w, kept] = batch.blocked[w, r]
+        if kept != r:
+            for value in (X, Z, ORIGIN, MARGIN, LEVER_X, LEVER_Z, NEAREST):
+                d[value + kept] = d[value + r]
+            s[DOUBT + kept], place[kept] = s[DOUBT + r], place[r]
+            for word in range(words):
+                w[word * WORD + BLOCKED + kept] = w[word * WORD + BLOCKED + r]
         kept += 1
     return kept
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _fill(batch: Batch, count: int) -> int:
+def _fill(d: Array, count: int) -> int:
     """Repeat the first row up to whole vectors, so that none is left to scalar code; how many."""
     n = (count + _LANES - 1) // _LANES * _LANES
     for r in range(count, n):
-        batch.x[r], batch.z[r] = batch.x[0], batch.z[0]
-        batch.origin[r], batch.margin[r] = batch.origin[0], batch.margin[0]
-        batch.lever_x[r], batch.lever_z[r] = batch.lever_x[0], batch.lever_z[0]
+        for value in (X, Z, ORIGIN, MARGIN, LEVER_X, LEVER_Z):
+            d[value + r] = d[value]
     return n
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _widest(turn: float) -> float:
-    """More than half of the arcs in which a line beyond the pivot is crossed or not."""
-    return 0.5 * math.pi + abs(turn) + 1e-9
+def _on_circle(angle: float, cells: Cells) -> float:
+    """An angle in cells, by less than half a turn."""
+    turn = 2.0 * math.pi
+    return (angle - turn * math.floor(angle / turn + 0.5)) * cells.scale
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _mark(
+    s: AnyArray, w: AnyArray, n: int, base: int, away: float, cells: Cells, words: int,
+    again: bool,
+) -> None:  # fmt: skip
+    """Set the cells of MASK in the arcs of LEFT and RATIO, about the places at `base`, + away."""
+    for other in range(2 if again else 1):
+        arcs(
+            s, n, base, away, cells.turn, cells.size, cells.period, cells.low,
+            cells.high, other == 1,
+        )  # fmt: skip
+        set_bits(s, w, n, words, cells.low)
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _beyond_polygon(
-    body: Profiles,
-    b: int,
-    polygons: Polygons,
-    k: int,
-    level: Level,
-    batch: Batch,
-    n: int,
+    sizes: Sizes, cells: Cells, d: Array, s: AnyArray, w: AnyArray, shape: Array, n: int
 ) -> int:
-    """Clear `blocked` where an edge of the polygon separates, and lower work[0] to the distances of
+    """Clear BLOCKED where an edge of the polygon separates, and lower NEAREST to the distances of
     the edges' lines. Bits of the edges that some pivot is in front of.
     """
-    depth, turn, step, cells = body.depth[b] + SLACK, level.turn, level.step, level.cells
-    nearest, c, half, center = (
-        batch.work[0, :n], batch.work[1, :n], batch.work[2, :n], batch.work[3, :n]
-    )  # fmt: skip
-    mask, doubt, margin = batch.mask, batch.doubt[:n], batch.margin[:n]
-    before = max(margin.max(), 0.0) + SLACK
-    center[:] = -batch.origin[:n]
+    depth, words, sides = sizes.depth + SLACK, sizes.words, sizes.sides
+    kind, boom_x, boom_z, boom, stick, bend = cells.moves
+    before = SLACK if kind == EXACT else max(extremes(d, MARGIN, n)[1], 0.0) + SLACK
+    fill(s, START, n, np.float32(0.0))
+    from_middle(d, s, n, cells.scale, cells.period, -cells.low)
     front = 0
-    for i in range(polygons.sides[k]):
-        nx, nz = polygons.normal_x[k, i], polygons.normal_z[k, i]
-        offsets(batch.x[:n], batch.z[:n], nx, nz, polygons.offset[k, i], c)
-        if level.kind != EXACT:
-            offsets_within(
-                batch.x[:n], batch.z[:n], margin, batch.lever_x[:n], batch.lever_z[:n], nx, nz,
-                level.boom_x, level.boom_z, level.boom, level.stick, level.bend, level.kind, c,
-            )  # fmt: skip
-        lower(nearest, c)
-        lowest = least(c)
+    for i in range(sizes.edges):
+        nx, nz = shape[6, i], shape[7, i]
+        lines(d, n, nx, nz, shape[8, i])
+        if kind != EXACT:
+            lines_within(d, n, nx, nz, boom_x, boom_z, boom, stick, bend, kind)
+        lowest, highest = nearer(d, n, depth)
         if lowest < before:
             front |= 1 << i
         if lowest >= depth:
             continue
-        highest = greatest_below(c, depth)
-        from_limit(c, depth, mask)
-        widest = _widest(turn) if highest < 0.0 else math.inf
-        for v in range(body.sides[b]):
-            radius = body.radius[b, v]
+        from_limit(d, w, n, words, depth)
+        for v in range(sides):
+            radius = shape[0, v]
             if highest <= -radius:
                 continue
-            arcs_before_line(c, radius, turn, half)
-            away = polygons.bearing[k, i] - body.bearing[b, v] + math.pi
-            mark(center, away, half, widest, step, cells, mask, doubt)
-        both(batch.blocked, mask, n)
+            before_line(d, s, n, radius)
+            away = _on_circle(shape[9, i] - shape[1, v] + math.pi, cells)
+            _mark(s, w, n, BASE, away, cells, words, cells.again or highest >= 0.0)
+        both(w, n, words)
     return front
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _beyond_body(
-    body: Profiles,
-    b: int,
-    polygons: Polygons,
-    k: int,
-    level: Level,
-    batch: Batch,
+    sizes: Sizes,
+    cells: Cells,
+    d: Array,
+    s: AnyArray,
+    w: AnyArray,
+    shape: Array,
     n: int,
     front: int,
 ) -> None:
-    """Clear `blocked` where an edge of the body separates. front: edges of the polygon that some
+    """Clear BLOCKED where an edge of the body separates. front: edges of the polygon that some
     pivot is in front of; only their corners bound what a line beyond the pivot separates.
     """
-    edges, turn, step, cells = polygons.sides[k], level.turn, level.step, level.cells
-    x, z, mask, doubt = batch.x[:n], batch.z[:n], batch.mask, batch.doubt[:n]
-    e, half, center = batch.work[1, :n], batch.work[2, :n], batch.work[3, :n]
-    ux, uz, middle, low, high = (
-        batch.work[4, :n], batch.work[5, :n], batch.work[6, :n], batch.work[7, :n],
-        batch.work[8, :n],
-    )  # fmt: skip
-    ux[:] = polygons.x[k, :edges].mean() - x
-    uz[:] = polygons.z[k, :edges].mean() - z
-    bearings(ux, uz, 0.0, middle)
-    middle -= batch.origin[:n]
-    low[:] = 0.0
+    edges, sides, words = sizes.edges, sizes.sides, sizes.words
+    mx = mz = 0.0
+    for v in range(edges):
+        mx, mz = mx + shape[4, v] / edges, mz + shape[5, v] / edges
+    towards(d, s, n, mx, mz, UX)
+    bearings(s, n)
+    from_middle(d, s, n, cells.scale, cells.period, -cells.low)
     # Beyond an edge that passes behind the pivot, any corner of the polygon may be the last; and
     # seen from inside of the polygon, all of them show that no line separates.
     corners = front | front << 1 | front >> (edges - 1)
-    smallest = min(least(batch.margin[:n]), 0.0)
-    behind = body.offset[b, : body.sides[b]].min() + least(batch.margin[:n]) <= -SLACK
-    if behind or greatest(batch.work[0, :n]) >= smallest - SLACK:
+    smallest, largest = (0.0, 0.0) if cells.moves[0] == EXACT else extremes(d, MARGIN, n)
+    behind = False
+    for j in range(sides):
+        behind = behind or shape[2, j] + smallest <= -SLACK
+    if behind or extremes(d, NEAREST, n)[1] >= min(smallest, 0.0) - SLACK:
         corners = -1
     for v in range(edges):
         if not (corners >> v) & 1:
             continue
-        inverse, at = batch.corners[0, v, :n], batch.corners[1, v, :n]
-        px, pz = polygons.x[k, v], polygons.z[k, v]
-        inverses(x, z, px, pz, inverse)
-        higher(low, inverse)
         # Directions are measured from the one to the middle of the polygon: seen from a pivot
         # outside of it, none is half a turn away.
-        along(x, z, px, pz, ux, uz, half)
-        aside(x, z, px, pz, ux, uz, center)
-        bearings(half, center, 0.0, at)
-    farthest = 1.0 / least(low)
-    for j in range(body.sides[b]):
-        e[:] = body.offset[b, j] + batch.margin[:n]
-        if abs(least(e)) < SLACK:
-            e[:] = np.maximum(e, 0.0)
-        lowest = least(e)
-        if lowest >= farthest:
-            continue
-        mask[:] = 0
-        away = -body.normal[b, j]
-        if lowest >= 0.0:
-            low[:], high[:] = -math.pi, math.pi
+        corner_distances(d, n, v, shape[4, v], shape[5, v])
+        towards(d, s, n, shape[4, v], shape[5, v], VX)
+        corner_directions(s, n, v)
+    for j in range(sides):
+        offset = shape[2, j]
+        if offset + smallest >= -SLACK:
+            fill(s, START, n, -HALF_TURN)
+            fill(s, END, n, HALF_TURN)
             for v in range(edges):
                 if (corners >> v) & 1:
-                    narrow(e, batch.corners[0, v, :n], batch.corners[1, v, :n], low, high)
-            arcs_between(low, high, turn, center, half)
-            center += middle
-            mark(center, away, half, _widest(turn), step, cells, mask, doubt)
-            without(batch.blocked, mask, n)
-        else:
-            widest = _widest(turn) if greatest(e) <= 0.0 else math.inf
-            for v in range(edges):
-                arcs_of_corner(e, batch.corners[0, v, :n], turn, half)
-                center[:] = middle + batch.corners[1, v, :n]
-                mark(center, away + math.pi, half, widest, step, cells, mask, doubt)
-            both(batch.blocked, mask, n)
+                    remaining(d, s, n, v, offset)
+                    narrow(s, n, v)
+            away = _on_circle(-shape[3, j], cells)
+            for other in range(2 if cells.again else 1):
+                between(
+                    s, n, away, cells.turn, cells.scale, cells.period, cells.low,
+                    cells.high, other == 1,
+                )  # fmt: skip
+                clear_bits(s, w, n, words, cells.low)
+            continue
+        for word in range(words):
+            fill(w, word * WORD + MASK, n, np.uint64(0))
+        opposite = _on_circle(math.pi - shape[3, j], cells)
+        for v in range(edges):
+            before_edge(d, s, n, v, offset)
+            corner_places(s, n, v, cells.scale)
+            _mark(s, w, n, VX, opposite, cells, words, cells.again or offset + largest > 0.0)
+        both(w, n, words)

@@ -8,7 +8,15 @@ import pytest
 from backend.cspace import rows
 from backend.cspace.exact_levels import Level
 from backend.cspace.planar_arm import Profiles, _profiles, hull
-from backend.cspace.rows_batch import SIZE, new_batch, touched_rows
+from backend.cspace.rows_batch import (
+    Sizes,
+    cells_of,
+    new_batch,
+    set_body,
+    set_polygon,
+    touched_rows,
+)
+from backend.cspace.rows_vector import BLOCKED, DOUBT, MARGIN, ORIGIN, SIZE, WORD, X, Z
 
 BODIES = 6
 
@@ -54,17 +62,24 @@ def test_batch_is_the_same_as_row_by_row(
     for case in range(60):
         body, p = bodies(rng), polygon(rng, (0.05, 0.3, 0.9)[case % 3])
         b, count = case % BODIES, (SIZE, 5)[case % 2]
-        batch = new_batch(words, p.x.shape[1])
-        batch.x[:count], batch.z[:count] = rng.uniform(-1.2, 1.2, (2, count))
-        batch.origin[:count] = rng.uniform(-4, 4, count)
-        batch.margin[:count] = margin * rng.uniform(0.5, 1.0, count)
+        batch = new_batch(words, max(p.x.shape[1], body.radius.shape[1]))
+        set_body(batch, body, b)
+        set_polygon(batch, p, 0)
+        x, z = rng.uniform(-1.2, 1.2, (2, count))
+        origin = rng.uniform(-4, 4, count)
+        margins = margin * rng.uniform(0.5, 1.0, count)
+        for begin, values in ((X, x), (Z, z), (ORIGIN, origin), (MARGIN, margins)):
+            batch.d[begin : begin + count] = values
         batch.place[:count] = np.arange(count)
-        x, z, origin, margins = (v.copy() for v in (batch.x, batch.z, batch.origin, batch.margin))
-        left = touched_rows(body, b, p, 0, level, batch, count, full)
+        sizes = Sizes(
+            int(body.sides[b]), float(body.depth[b]), float(body.reach[b]), int(p.sides[0]), words
+        )
+        left = touched_rows(sizes, cells_of(level), batch, count, full)
         found = np.zeros((count, words), np.uint64)
-        found[batch.place[:left]] = batch.blocked[:, :left].T & full
+        bits = np.array([batch.w[k * WORD + BLOCKED :][:left] for k in range(words)])
+        found[batch.place[:left]] = bits.T & full
         sure = np.ones(count, dtype=bool)
-        sure[batch.place[:left]] = batch.doubt[:left] >= 0.0
+        sure[batch.place[:left]] = batch.s[DOUBT : DOUBT + left] >= 0.0
         for r in np.flatnonzero(sure):
             row = np.zeros(words, np.uint64)
             rows.touched(body, b, p, 0, x[r], z[r], origin[r], step, cells, margins[r], turn, row)
@@ -74,5 +89,5 @@ def test_batch_is_the_same_as_row_by_row(
                 np.testing.assert_array_equal(found[r], row & full)
             compared += 1
             blocked += bool(found[r].any())
-    assert compared > 2000
+    assert compared > 3900
     assert blocked > 300
