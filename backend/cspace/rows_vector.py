@@ -191,7 +191,9 @@ def arcs(
         h = _ALL_AROUND if h >= _WHOLE_TURN else h
         # What is always or never beyond the line is known in double precision.
         h = (h if left > ZERO else (_ALL_AROUND if ratio > ZERO else _NO_ARC)) * size
-        low, high = max(c - h, least), min(c + h, most)
+        s[FIRST + r], s[LAST + r] = max(c - h, least), min(c + h, most)
+    for r in range(n):  # on its own it keeps more in registers
+        low, high = s[FIRST + r], s[LAST + r]
         at, to = (low + _DROP_SINGLE) - _DROP_SINGLE, (high + _DROP_SINGLE) - _DROP_SINGLE
         s[FIRST + r] = at if at > low else at + _ONE
         s[LAST + r] = to if to < high else to - _ONE
