@@ -13,7 +13,7 @@ from backend.shell.priority import set_niceness
 
 NICENESS = 2
 """The fast loop goes before images when processors are short."""
-SLOW = 6
+SLOW = 4
 """And images made many times a second before those that take longer and are made less often."""
 
 Question = TypeVar("Question")
