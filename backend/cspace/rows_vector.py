@@ -6,6 +6,9 @@ an array takes longer than what is done with them. So all a batch needs lies in 
 row in each at a place known beforehand. Single precision, which does twice as many at once, for
 everything but where rounding would spoil the ends of arcs.
 
+The checks that loops begin with never fail: n is at most SIZE, and polygons have far fewer corners.
+They tell the compiler that no index is below 0, which it would test for every value.
+
 Below, a list of n values that begins at NAME is called by that name; cells are places in the rows,
 on the circle, 0 the one in the middle, where single precision is best.
 """
