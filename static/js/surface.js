@@ -11,7 +11,7 @@ import { mark } from "./words.js";
  */
 export function surface(canvas, paint, probe, aim) {
   const g = canvas.getContext("2d", { alpha: false, willReadFrequently: true });
-  const s = { canvas, probe, aim, width: 0, height: 0, dirty: true, last: -Infinity, lastLabel: -Infinity, cost: 0 };
+  const s = { canvas, probe, aim, width: 0, height: 0, dirty: true, last: -Infinity, label: null, lastLabel: -Infinity, cost: 0 };
 
   new ResizeObserver(() => {
     const dpr = window.devicePixelRatio || 1;
@@ -25,8 +25,17 @@ export function surface(canvas, paint, probe, aim) {
     s.last = -Infinity;
   }).observe(canvas);
 
+  /** Read aloud at most twice a second; the last one is never left out. */
+  const tell = (now) => {
+    if (s.label === null || now - s.lastLabel <= 500) return;
+    canvas.setAttribute("aria-label", s.label);
+    s.label = null;
+    s.lastLabel = now;
+  };
+
   /** Draws when something changed, at most once per `period` ms. */
   s.draw = (now, period) => {
+    tell(now);
     if (!s.dirty || now - s.last < period || s.width < 20 || s.height < 10) return false;
     s.dirty = false;
     s.last = now;
@@ -47,10 +56,8 @@ export function surface(canvas, paint, probe, aim) {
     if (shown) {
       mark(canvas, "state", JSON.stringify(shown.state));
       mark(canvas, "age", Number.isFinite(shown.age) ? shown.age.toFixed(2) : "none");
-      if (now - s.lastLabel > 500) {
-        s.lastLabel = now;
-        canvas.setAttribute("aria-label", shown.label);
-      }
+      s.label = shown.label;
+      tell(now);
     }
     return true;
   };

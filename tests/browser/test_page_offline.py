@@ -289,6 +289,35 @@ def test_panels_show_what_the_frames_say(feed: Feed) -> None:
     assert feed.errors == []
 
 
+def test_the_last_drawing_is_the_one_that_is_described(feed: Feed) -> None:
+    """A plot is described at most twice a second, and in the end as it was drawn last."""
+    described = feed.page.evaluate(
+        """async () => {
+          const { surface } = await import("/static/js/surface.js");
+          const canvas = document.createElement("canvas");
+          canvas.style.cssText = "position: fixed; width: 90px; height: 90px";
+          document.body.append(canvas);
+          let label = "first";
+          const plot = surface(canvas, () => ({ state: {}, age: 0, label }));
+          while (!plot.width) await new Promise(requestAnimationFrame);
+          const seen = [];
+          const draw = (now) => {
+            plot.draw(now, 0);
+            seen.push(canvas.getAttribute("aria-label"));
+          };
+          draw(1000);
+          label = "second";
+          plot.dirty = true;
+          draw(1100); // drawn, but too early to be described
+          draw(1400);
+          draw(1600); // nothing new to draw
+          canvas.remove();
+          return seen;
+        }"""
+    )
+    assert described == ["first", "first", "first", "second"]
+
+
 def test_alarm_replaces_the_calm_line(feed: Feed) -> None:
     feed.send(feed.ready)
     line = "SLOW · LEFT bucket ↔ RIGHT boom · 0.62 m"
