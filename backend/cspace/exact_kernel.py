@@ -28,18 +28,8 @@ from backend.cspace.rows_batch import (
     set_polygon,
     touched_rows,
 )
-from backend.cspace.rows_vector import (
-    BLOCKED,
-    DOUBT,
-    LEVER_X,
-    LEVER_Z,
-    MARGIN,
-    ORIGIN,
-    SIZE,
-    WORD,
-    X,
-    Z,
-)
+from backend.cspace.rows_near import near_rows, swept_of
+from backend.cspace.rows_vector import BLOCKED, DOUBT, MARGIN, ORIGIN, WORD, X, Z
 from backend.spatial.types import AnyArray, Array, BoolArray, IntArray
 
 
@@ -153,7 +143,7 @@ def _decide(
             _keep_box(chain, group, b, boxes, polygons.obstacle[p], level, batch, r, full, row)
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True, _nrt=False)  # type: ignore[untyped-decorator]
 def _doubted(s: AnyArray, count: int) -> bool:
     some = False
     for r in range(count):
@@ -161,7 +151,7 @@ def _doubted(s: AnyArray, count: int) -> bool:
     return some
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True, _nrt=False)  # type: ignore[untyped-decorator]
 def _write(
     words: AnyArray, place: IntArray, count: int, full: AnyArray, done: BoolArray, out: AnyArray
 ) -> None:
@@ -173,39 +163,6 @@ def _write(
             out[m, w] = bits
             every = every and bits == full[w]
         done[m] = every
-
-
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _gather(
-    x: Array, z: Array, origin: Array, margin: Array, lever_x: Array, lever_z: Array,
-    runs: tuple[Array, Array], around: tuple[float, float, float, float], reach: float,
-    widest: float, done: BoolArray, m: int, d: Array, place: IntArray,
-) -> tuple[int, int]:  # fmt: skip
-    """Fill a batch with the rows from m on, but for those `done`, whose pivots are within reach of
-    the rectangle `around`: left, below, right, above; how many, and where to go on. See Level.
-    """
-    left, below, right, above = around
-    low, high = runs
-    count, within, levers = 0, reach + widest, len(lever_x) > 0
-    while m < len(x) and count < SIZE:
-        if m % RUN == 0:
-            run = m // RUN
-            dx = max(left - high[run, 0], 0.0, low[run, 0] - right)
-            dz = max(below - high[run, 1], 0.0, low[run, 1] - above)
-            if dx * dx + dz * dz > within * within:
-                m += RUN
-                continue
-        px, pz, near = x[m], z[m], reach + max(margin[m], 0.0)
-        dx = max(max(left - px, px - right), 0.0)
-        dz = max(max(below - pz, pz - above), 0.0)
-        if dx * dx + dz * dz <= near * near and not done[m]:
-            d[X + count], d[Z + count], place[count] = px, pz, m
-            d[ORIGIN + count], d[MARGIN + count] = origin[m], margin[m]
-            if levers:
-                d[LEVER_X + count], d[LEVER_Z + count] = lever_x[m], lever_z[m]
-            count += 1
-        m += 1
-    return count, m
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
@@ -228,7 +185,8 @@ def _rows(
     # Arrays are taken out of tuples before loops: each time that is done, their uses are counted.
     d, singles, words, place = batch.d, batch.s, batch.w, batch.place
     xs, zs, margins, origins = level.x, level.z, level.margin, level.origin
-    lever_x, lever_z, runs = level.lever_x, level.lever_z, (level.low, level.high)
+    first_x, first_z, lever_x, lever_z = level.first_x, level.first_z, level.lever_x, level.lever_z
+    runs, some = (level.low, level.high), np.empty(RUN, np.uint8)
     groups, sides, slabs = body.group, body.sides, body.slab
     of_slab, obstacles, lows, highs = polygons.slab, polygons.obstacle, polygons.low, polygons.high
     cells = cells_of(level)
@@ -239,22 +197,22 @@ def _rows(
             if groups[b] != group or sides[b] == 0 or late != (turn == 1):
                 continue
             set_body(batch, body, b)
-            reach, depth = body.reach[b], body.depth[b]
+            swept, depth = swept_of(body, b, level), body.depth[b]
             for p in range(len(of_slab)):
                 if of_slab[p] != slabs[b] or not pairs[b, obstacles[p]]:
                     continue
                 set_polygon(batch, polygons, p)
-                sizes = Sizes(sides[b], depth, reach, polygons.sides[p], len(full))
+                sizes = Sizes(sides[b], depth, swept.reach, polygons.sides[p], len(full))
                 around = (lows[p, 0], lows[p, 1], highs[p, 0], highs[p, 1])
                 m = 0
                 while m < len(xs):
-                    count, m = _gather(
-                        xs, zs, origins, margins, lever_x, lever_z, runs, around, reach,
-                        level.widest, done, m, d, place,
+                    count, m = near_rows(
+                        xs, zs, origins, margins, first_x, first_z, lever_x, lever_z, runs, around,
+                        swept, level.widest, done, m, d, place, some,
                     )  # fmt: skip
                     if count == 0:
                         continue
-                    count = touched_rows(sizes, cells, batch, count, full)
+                    count = touched_rows(sizes, cells, batch, count, full, out)
                     if late or _doubted(singles, count):
                         _decide(
                             chain, group, b, body, polygons, p, boxes, level, batch, count, full,
@@ -263,7 +221,7 @@ def _rows(
                     _write(words, place, count, full, done, out)
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True, _nrt=False)  # type: ignore[untyped-decorator]
 def _pass_on(
     row: AnyArray, n: int, share: int, full: AnyArray, done: BoolArray, out: AnyArray
 ) -> None:

@@ -32,8 +32,8 @@ class Level(NamedTuple):
     """The rows of one joint: for the boom 1, for the stick one for each cell of the boom, for the
     bucket one for each cell of boom and stick.
 
-    kind: EXACT, OUTER, INNER; x, z: (m,) pivots [m]; origin: (m,) angles of the first cells [rad];
-    margin: (m,) how far a pivot can be from there [m]; turn: how far the angle can be from its
+    kind: EXACT, OUTER, INNER; x, z: (m,) pivots [m]; origin: (m,) angles of the first cells [rad],
+    first_x, first_z: (m,) and their directions; margin: (m,) how far a pivot can be from there [m]; turn: how far the angle can be from its
     cell's [rad]; both below 0 for INNER. step, cells: of the rows. widest: the largest margin; low,
     high: (runs, 2) bounds of the pivots of RUN rows.
 
@@ -46,6 +46,8 @@ class Level(NamedTuple):
     x: Array
     z: Array
     origin: Array
+    first_x: Array
+    first_z: Array
     margin: Array
     lever_x: Array
     lever_z: Array
@@ -72,37 +74,40 @@ def levels(links: Array, axes: Array, kind: int) -> tuple[Level, Level, Level]:
     ox, oz = links[0, 0], links[0, 1]
     l1, l2 = math.hypot(links[1, 0], links[1, 1]), math.hypot(links[2, 0], links[2, 1])
     rows = n1 * n2
-    x0, z0, origin0, margin0 = (
+    x0, z0, origin0, first0 = (
         np.full(1, ox),
         np.full(1, oz),
         np.full(1, axes[1, START]),
-        np.empty(1),
+        np.empty(2),
     )
-    x1, z1, origin1, margin1 = np.empty(n1), np.empty(n1), np.empty(n1), np.empty(n1)
-    x2, z2, origin2, margin2 = np.empty(rows), np.empty(rows), np.empty(rows), np.empty(rows)
-    lever_x, lever_z = (
-        np.empty(rows if kind != EXACT else 0),
-        np.empty(rows if kind != EXACT else 0),
-    )
-    u2 = np.empty((n2, 2))
+    x1, z1, origin1, first1 = np.empty(n1), np.empty(n1), np.empty(n1), np.empty((2, n1))
+    x2, z2, origin2, first2 = np.empty(rows), np.empty(rows), np.empty(rows), np.empty((2, rows))
+    margin0, margin1, margin2 = np.full(1, kind * ROUNDING), np.empty(n1), np.empty(rows)
+    levers = rows if kind != EXACT else 0
+    lever_x, lever_z = np.empty(levers), np.empty(levers)
+    u2, f2 = np.empty((n2, 2)), np.empty((n2, 2))
     for j in range(n2):
         angle = axes[2, START] + axes[2, STEP] * j
         c, s = math.cos(angle), math.sin(angle)
         u2[j, 0] = c * links[2, 0] - s * links[2, 1]
         u2[j, 1] = s * links[2, 0] + c * links[2, 1]
-    margin0[0] = kind * ROUNDING
+        f2[j, 0], f2[j, 1] = math.cos(axes[3, START] + angle), math.sin(axes[3, START] + angle)
+    first0[0], first0[1] = math.cos(axes[1, START]), math.sin(axes[1, START])
+    b, a = math.cos(axes[2, START]), math.sin(axes[2, START])
     for i in range(n1):
         angle = axes[1, START] + axes[1, STEP] * i
         c, s = math.cos(angle), math.sin(angle)
         vx, vz = c * links[1, 0] - s * links[1, 1], s * links[1, 0] + c * links[1, 1]
         x1[i], z1[i] = ox + vx, oz + vz
         origin1[i] = axes[2, START] + angle
+        first1[0, i], first1[1, i] = c * b - s * a, s * b + c * a
         margin1[i] = kind * (l1 * half1 + ROUNDING)
         for j in range(n2):
             k = i * n2 + j
             wx, wz = c * u2[j, 0] - s * u2[j, 1], s * u2[j, 0] + c * u2[j, 1]
             x2[k], z2[k] = x1[i] + wx, z1[i] + wz
             origin2[k] = axes[3, START] + (angle + (axes[2, START] + axes[2, STEP] * j))
+            first2[0, k], first2[1, k] = c * f2[j, 0] - s * f2[j, 1], s * f2[j, 0] + c * f2[j, 1]
             if kind == EXACT:
                 margin2[k] = 0.0
                 continue
@@ -120,15 +125,15 @@ def levels(links: Array, axes: Array, kind: int) -> tuple[Level, Level, Level]:
     turn3 = kind * (half1 + half2 + half3 + ROUNDING)
     return (
         Level(
-            kind, x0, z0, origin0, margin0, np.zeros(1), np.zeros(1), ox, oz, 0.0, 0.0, ROUNDING,
+            kind, x0, z0, origin0, first0[:1], first0[1:], margin0, np.zeros(1), np.zeros(1), ox, oz, 0.0, 0.0, ROUNDING,
             turn1, axes[1, STEP], n1, max(margin0[0], 0.0), low0, high0,
         ),
         Level(
-            kind, x1, z1, origin1, margin1, none, none, ox, oz, half1, 0.0, bend1,
+            kind, x1, z1, origin1, first1[0], first1[1], margin1, none, none, ox, oz, half1, 0.0, bend1,
             turn2, axes[2, STEP], n2, widest1, low1, high1,
         ),
         Level(
-            kind, x2, z2, origin2, margin2, lever_x, lever_z, ox, oz, half1, half2, bend2,
+            kind, x2, z2, origin2, first2[0], first2[1], margin2, lever_x, lever_z, ox, oz, half1, half2, bend2,
             turn3, axes[3, STEP], int(axes[3, COUNT]), widest2, low2, high2,
         ),
     )  # fmt: skip

@@ -27,6 +27,7 @@ from backend.cspace.rows_vector import (
     END,
     LEVER_X,
     LEVER_Z,
+    LINE,
     MARGIN,
     MASK,
     NEAREST,
@@ -56,6 +57,7 @@ from backend.cspace.rows_vector import (
     lines_within,
     narrow,
     nearer,
+    nearest,
     remaining,
     set_bits,
     towards,
@@ -102,7 +104,7 @@ def new_batch(words: int, corners: int) -> Batch:
     )  # fmt: skip
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True, _nrt=False)  # type: ignore[untyped-decorator]
 def set_body(batch: Batch, body: Profiles, b: int) -> None:
     """Rows are of body b from now on."""
     shape = batch.shape
@@ -111,7 +113,7 @@ def set_body(batch: Batch, body: Profiles, b: int) -> None:
         shape[2, v], shape[3, v] = body.offset[b, v], body.normal[b, v]
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True, _nrt=False)  # type: ignore[untyped-decorator]
 def set_polygon(batch: Batch, polygons: Polygons, k: int) -> None:
     """And against polygon k."""
     shape = batch.shape
@@ -143,7 +145,7 @@ class Cells(NamedTuple):
     moves: tuple[int, float, float, float, float, float]
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True, _nrt=False)  # type: ignore[untyped-decorator]
 def cells_of(level: Level) -> Cells:
     """The rows of a level."""
     scale = 1.0 / level.step
@@ -157,11 +159,13 @@ def cells_of(level: Level) -> Cells:
     )  # fmt: skip
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def touched_rows(sizes: Sizes, cells: Cells, batch: Batch, count: int, full: AnyArray) -> int:
+@njit(cache=True, nogil=True, _nrt=False)  # type: ignore[untyped-decorator]
+def touched_rows(
+    sizes: Sizes, cells: Cells, batch: Batch, count: int, full: AnyArray, known: AnyArray
+) -> int:
     """Set BLOCKED to the cells where the body is not apart from the polygon, and DOUBT to below 0
-    where that is not sure. Rows with none are dropped from the first `count`; how many are left.
-    full: (words,) the cells that count.
+    where that is not sure. Rows with none but `known` ones are dropped from the first `count`; how
+    many are left. full: (words,) the cells that count; known: (m, words) blocked anyway.
     """
     d, s, w = batch.d, batch.s, batch.w
     words = sizes.words
@@ -171,7 +175,7 @@ def touched_rows(sizes: Sizes, cells: Cells, batch: Batch, count: int, full: Any
     fill(s, DOUBT, n, np.float32(math.inf))
     fill(d, NEAREST, n, math.inf)
     front = _beyond_polygon(sizes, cells, d, s, w, batch.shape, n)
-    count = _kept(d, s, w, batch.place, count, full, cells.close)
+    count = _kept(d, s, w, batch.place, count, full, known, cells.close)
     if count == 0:
         return 0
     _beyond_body(sizes, cells, d, s, w, batch.shape, _fill(d, count), front)
@@ -187,7 +191,7 @@ def touched_rows(sizes: Sizes, cells: Cells, batch: Batch, count: int, full: Any
     return count
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True, _nrt=False)  # type: ignore[untyped-decorator]
 def _kept(
     d: Array,
     s: AnyArray,
@@ -195,27 +199,26 @@ def _kept(
     place: IntArray,
     count: int,
     full: AnyArray,
+    known: AnyArray,
     close: float,
 ) -> int:
-    """Move the rows in which something may still be blocked to the front; how many."""
+    """Move the rows in which more than `known` may be blocked to the front; how many."""
     words, kept = len(full), 0
     for r in range(count):
-        some = s[DOUBT + r] < close
+        some, m = s[DOUBT + r] < close, place[r]
         for word in range(words):
-            some = some or w[word * WORD + BLOCKED + r] & full[word] != 0
-        if not some:
-            continue
-        if kept != r:
-            for value in (X, Z, ORIGIN, MARGIN, LEVER_X, LEVER_Z, NEAREST):
-                d[value + kept] = d[value + r]
-            s[DOUBT + kept], place[kept] = s[DOUBT + r], place[r]
-            for word in range(words):
-                w[word * WORD + BLOCKED + kept] = w[word * WORD + BLOCKED + r]
-        kept += 1
+            some |= w[word * WORD + BLOCKED + r] & full[word] & ~known[m, word] != 0
+        # What is not kept is written over by the next.
+        for value in (X, Z, ORIGIN, MARGIN, LEVER_X, LEVER_Z, NEAREST):
+            d[value + kept] = d[value + r]
+        s[DOUBT + kept], place[kept] = s[DOUBT + r], m
+        for word in range(words):
+            w[word * WORD + BLOCKED + kept] = w[word * WORD + BLOCKED + r]
+        kept += 1 if some else 0
     return kept
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True, _nrt=False)  # type: ignore[untyped-decorator]
 def _fill(d: Array, count: int) -> int:
     """Repeat the first row up to whole vectors, so that none is left to scalar code; how many."""
     n = (count + _LANES - 1) // _LANES * _LANES
@@ -225,14 +228,14 @@ def _fill(d: Array, count: int) -> int:
     return n
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True, _nrt=False)  # type: ignore[untyped-decorator]
 def _on_circle(angle: float, cells: Cells) -> float:
     """An angle in cells, by less than half a turn."""
     turn = 2.0 * math.pi
     return (angle - turn * math.floor(angle / turn + 0.5)) * cells.scale
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True, _nrt=False)  # type: ignore[untyped-decorator]
 def _mark(
     s: AnyArray, w: AnyArray, n: int, base: int, away: float, cells: Cells, words: int,
     again: bool,
@@ -246,7 +249,7 @@ def _mark(
         set_bits(s, w, n, words, cells.low)
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True, _nrt=False)  # type: ignore[untyped-decorator]
 def _beyond_polygon(
     sizes: Sizes, cells: Cells, d: Array, s: AnyArray, w: AnyArray, shape: Array, n: int
 ) -> int:
@@ -281,7 +284,7 @@ def _beyond_polygon(
     return front
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True, _nrt=False)  # type: ignore[untyped-decorator]
 def _beyond_body(
     sizes: Sizes,
     cells: Cells,
@@ -311,17 +314,22 @@ def _beyond_body(
         behind = behind or shape[2, j] + smallest <= -SLACK
     if behind or extremes(d, NEAREST, n)[1] >= min(smallest, 0.0) - SLACK:
         corners = -1
+    fill(d, LINE, n, math.inf)
     for v in range(edges):
         if not (corners >> v) & 1:
             continue
         # Directions are measured from the one to the middle of the polygon: seen from a pivot
         # outside of it, none is half a turn away.
         corner_distances(d, n, v, shape[4, v], shape[5, v])
+        nearest(d, n, v)
         towards(d, s, n, shape[4, v], shape[5, v], VX)
         corner_directions(s, n, v)
+    farthest = extremes(d, LINE, n)[1]
     for j in range(sides):
         offset = shape[2, j]
         if offset + smallest >= -SLACK:
+            if farthest <= offset:
+                continue  # in every row a corner is too near to be beyond this edge
             fill(s, START, n, -HALF_TURN)
             fill(s, END, n, HALF_TURN)
             for v in range(edges):

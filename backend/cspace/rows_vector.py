@@ -54,7 +54,7 @@ _DROP, _DROP_SINGLE = 1.5 * 2.0**52, np.float32(1.5 * 2.0**23)
 _FAR = 1 << 20  # no list begins farther from the array's beginning
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True, _nrt=False)  # type: ignore[untyped-decorator]
 def fill(values: AnyArray, begin: int, n: int, value: Any) -> None:
     """Set n values of any array, from `begin`."""
     if n > SIZE or begin < 0 or begin > _FAR:
@@ -63,7 +63,7 @@ def fill(values: AnyArray, begin: int, n: int, value: Any) -> None:
         values[begin + r] = value
 
 
-@njit(cache=True, nogil=True, fastmath={"nnan", "nsz"})  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True, _nrt=False, fastmath={"nnan", "nsz"})  # type: ignore[untyped-decorator]
 def extremes(d: Array, begin: int, n: int) -> tuple[float, float]:
     """Smallest and greatest of n doubles from `begin`."""
     low = high = d[begin]
@@ -73,7 +73,7 @@ def extremes(d: Array, begin: int, n: int) -> tuple[float, float]:
     return low, high
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True, _nrt=False)  # type: ignore[untyped-decorator]
 def lines(d: Array, n: int, nx: float, nz: float, offset: float) -> None:
     """LINE: distances of the line n . x = offset from the pivots along its normal."""
     if n > SIZE:
@@ -82,7 +82,7 @@ def lines(d: Array, n: int, nx: float, nz: float, offset: float) -> None:
         d[LINE + r] = offset - nx * d[X + r] - nz * d[Z + r]
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True, _nrt=False)  # type: ignore[untyped-decorator]
 def lines_within(
     d: Array, n: int, nx: float, nz: float, boom_x: float, boom_z: float, boom: float,
     stick: float, bend: float, sign: int,
@@ -98,7 +98,7 @@ def lines_within(
         d[LINE + r] += sign * min(by_boom + by_stick + bend, sign * d[MARGIN + r])
 
 
-@njit(cache=True, nogil=True, fastmath={"nnan", "nsz"})  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True, _nrt=False, fastmath={"nnan", "nsz"})  # type: ignore[untyped-decorator]
 def nearer(d: Array, n: int, limit: float) -> tuple[float, float]:
     """Lower NEAREST to LINE. The smallest of LINE, and the greatest under the limit, -1e300 when
     there is none.
@@ -112,7 +112,7 @@ def nearer(d: Array, n: int, limit: float) -> tuple[float, float]:
     return low, high
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True, _nrt=False)  # type: ignore[untyped-decorator]
 def from_limit(d: Array, w: AnyArray, n: int, words: int, limit: float) -> None:
     """MASK: all bits of the rows whose LINE is at or over the limit, none of the others."""
     if n > SIZE:
@@ -122,7 +122,7 @@ def from_limit(d: Array, w: AnyArray, n: int, words: int, limit: float) -> None:
             w[k * WORD + MASK + r] = ALL if d[LINE + r] >= limit else np.uint64(0)
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True, _nrt=False)  # type: ignore[untyped-decorator]
 def both(w: AnyArray, n: int, words: int) -> None:
     """BLOCKED = BLOCKED & MASK."""
     if n > SIZE:
@@ -132,7 +132,7 @@ def both(w: AnyArray, n: int, words: int) -> None:
             w[k * WORD + BLOCKED + r] &= w[k * WORD + MASK + r]
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True, _nrt=False)  # type: ignore[untyped-decorator]
 def from_middle(d: Array, s: AnyArray, n: int, scale: float, period: float, middle: float) -> None:
     """BASE: the direction START, in cells. scale: cells for an angle; period: of the circle;
     middle: cells before the one in the middle.
@@ -145,7 +145,7 @@ def from_middle(d: Array, s: AnyArray, n: int, scale: float, period: float, midd
         s[BASE + r] = c - period * ((c * turns + _DROP) - _DROP)
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True, _nrt=False)  # type: ignore[untyped-decorator]
 def before_line(d: Array, s: AnyArray, n: int, radius: float) -> None:
     """LEFT and RATIO of LINE and a corner at `radius`."""
     if n > SIZE:
@@ -156,7 +156,7 @@ def before_line(d: Array, s: AnyArray, n: int, radius: float) -> None:
         s[LEFT + r], s[RATIO + r] = 1.0 - abs(t), t
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True, _nrt=False)  # type: ignore[untyped-decorator]
 def before_edge(d: Array, s: AnyArray, n: int, v: int, offset: float) -> None:
     """LEFT and RATIO of the body's edge at `offset` and corner v of the polygon."""
     if n > SIZE or v < 0 or v > SIZE:
@@ -168,7 +168,7 @@ def before_edge(d: Array, s: AnyArray, n: int, v: int, offset: float) -> None:
         s[RATIO + r] = e * s[inverse + r]
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True, _nrt=False)  # type: ignore[untyped-decorator]
 def arcs(
     s: AnyArray, n: int, base: int, away: float, turn: float, scale: float, period: float,
     low_end: float, high_end: float, other: bool,
@@ -203,7 +203,7 @@ def arcs(
         s[DOUBT + r] = min(s[DOUBT + r], min(abs(low - at), abs(high - to)))
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True, _nrt=False)  # type: ignore[untyped-decorator]
 def remaining(d: Array, s: AnyArray, n: int, v: int, offset: float) -> None:
     """LEFT: how much farther corner v of the polygon is than the body's edge at `offset`."""
     if n > SIZE or v < 0 or v > SIZE:
@@ -213,7 +213,7 @@ def remaining(d: Array, s: AnyArray, n: int, v: int, offset: float) -> None:
         s[LEFT + r] = d[away + r] - (d[MARGIN + r] + offset)
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True, _nrt=False)  # type: ignore[untyped-decorator]
 def narrow(s: AnyArray, n: int, v: int) -> None:
     """Raise START and lower END to the directions of the normals between which corner v lies beyond
     an edge that it is farther away than by LEFT.
@@ -231,7 +231,7 @@ def narrow(s: AnyArray, n: int, v: int) -> None:
         s[END + r] = min(s[END + r], s[at + r] + h)
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True, _nrt=False)  # type: ignore[untyped-decorator]
 def between(
     s: AnyArray, n: int, away: float, turn: float, scale: float, period: float, low_end: float,
     high_end: float, other: bool,
@@ -258,7 +258,7 @@ def between(
         s[DOUBT + r] = min(s[DOUBT + r], min(abs(low - at), abs(high - to)))
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True, _nrt=False)  # type: ignore[untyped-decorator]
 def towards(d: Array, s: AnyArray, n: int, px: float, pz: float, begin: int) -> None:
     """Vectors from the pivots to the point p, from `begin` and, their z, behind it."""
     if n > SIZE or begin < 0 or begin > _FAR:
@@ -267,7 +267,7 @@ def towards(d: Array, s: AnyArray, n: int, px: float, pz: float, begin: int) -> 
         s[begin + r], s[begin + SIZE + r] = px - d[X + r], pz - d[Z + r]
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True, _nrt=False)  # type: ignore[untyped-decorator]
 def bearings(s: AnyArray, n: int) -> None:
     """START: directions of (UX, UZ)."""
     if n > SIZE:
@@ -276,7 +276,7 @@ def bearings(s: AnyArray, n: int) -> None:
         s[START + r] = bearing(s[UX + r], s[UZ + r])
 
 
-@njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True, _nrt=False, error_model="numpy")  # type: ignore[untyped-decorator]
 def corner_directions(s: AnyArray, n: int, v: int) -> None:
     """Of corner v, to which (VX, VZ) lead: one over its distance, and its direction from that of
     (UX, UZ).
@@ -290,7 +290,7 @@ def corner_directions(s: AnyArray, n: int, v: int) -> None:
         s[inverse + SIZE + r] = bearing(ux * x + uz * z, ux * z - uz * x)
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True, _nrt=False)  # type: ignore[untyped-decorator]
 def corner_distances(d: Array, n: int, v: int, px: float, pz: float) -> None:
     """How far corner v, the point p, is from the pivots."""
     if n > SIZE or v < 0 or v > SIZE:
@@ -301,7 +301,17 @@ def corner_distances(d: Array, n: int, v: int, px: float, pz: float) -> None:
         d[away + r] = math.sqrt(dx * dx + dz * dz)
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True, _nrt=False, fastmath={"nnan", "nsz"})  # type: ignore[untyped-decorator]
+def nearest(d: Array, n: int, v: int) -> None:
+    """Lower LINE to how far corner v is beyond the margin."""
+    if n > SIZE or v < 0 or v > SIZE:
+        return
+    away = AWAY + v * SIZE
+    for r in range(n):
+        d[LINE + r] = min(d[LINE + r], d[away + r] - d[MARGIN + r])
+
+
+@njit(cache=True, nogil=True, _nrt=False)  # type: ignore[untyped-decorator]
 def corner_places(s: AnyArray, n: int, v: int, scale: float) -> None:
     """(VX) where corner v is in the rows, in cells. scale: cells for an angle."""
     if n > SIZE or v < 0 or v > SIZE:
@@ -311,7 +321,7 @@ def corner_places(s: AnyArray, n: int, v: int, scale: float) -> None:
         s[VX + r] = s[BASE + r] + factor * s[at + r]
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True, _nrt=False)  # type: ignore[untyped-decorator]
 def set_bits(s: AnyArray, w: AnyArray, n: int, words: int, low_end: float) -> None:
     """Set the cells of MASK from FIRST to LAST. low_end: see `arcs`."""
     if n > SIZE:
@@ -322,7 +332,7 @@ def set_bits(s: AnyArray, w: AnyArray, n: int, words: int, low_end: float) -> No
             w[k * WORD + MASK + r] |= _bits(s[FIRST + r] - base, s[LAST + r] - base)
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True, _nrt=False)  # type: ignore[untyped-decorator]
 def clear_bits(s: AnyArray, w: AnyArray, n: int, words: int, low_end: float) -> None:
     """Clear those of BLOCKED."""
     if n > SIZE:
@@ -333,7 +343,7 @@ def clear_bits(s: AnyArray, w: AnyArray, n: int, words: int, low_end: float) -> 
             w[k * WORD + BLOCKED + r] &= ~_bits(s[FIRST + r] - base, s[LAST + r] - base)
 
 
-@njit(cache=True, nogil=True, inline="always")  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True, _nrt=False, inline="always")  # type: ignore[untyped-decorator]
 def _bits(first: np.float32, last: np.float32) -> np.uint64:
     """Bits from first to last of a word."""
     up = np.uint64(np.int32(min(max(first, ZERO), _LAST)))
