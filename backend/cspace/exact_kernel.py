@@ -15,7 +15,7 @@ import numpy as np
 from numba import njit
 
 from backend.cspace.exact_boxes import gap
-from backend.cspace.exact_levels import EXACT, RUN, Level
+from backend.cspace.exact_levels import EXACT, Level
 from backend.cspace.exact_slices import slices
 from backend.cspace.planar_arm import Profiles
 from backend.cspace.rows import ALL, Polygons, touched
@@ -84,7 +84,7 @@ def full_words(n: int) -> AnyArray:
     return out
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True, _nrt=True)  # type: ignore[untyped-decorator]
 def _keep_box(
     chain: Chain,
     group: int,
@@ -112,7 +112,7 @@ def _keep_box(
         batch.w[w * WORD + BLOCKED + r] = bits
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True, _nrt=False)  # type: ignore[untyped-decorator]
 def _decide(
     chain: Chain,
     group: int,
@@ -129,12 +129,14 @@ def _decide(
 ) -> None:
     """Decide what is in doubt in the first `count` rows of a batch, or a box that is no prism."""
     d, words, size = batch.d, batch.w, len(full)
+    room, sure = batch.room[:2], batch.room[2]
     for r in range(count):
         if batch.s[DOUBT + r] < 0.0:
-            sure = np.zeros(size, np.uint64)
+            for w in range(size):
+                sure[w] = np.uint64(0)
             touched(
                 body, b, polygons, p, d[X + r], d[Z + r], d[ORIGIN + r], level.step,
-                level.cells, d[MARGIN + r], level.turn, sure,
+                level.cells, d[MARGIN + r], level.turn, room, sure,
             )  # fmt: skip
             for w in range(size):
                 words[w * WORD + BLOCKED + r] = sure[w]
@@ -165,7 +167,7 @@ def _write(
         done[m] = every
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True, _nrt=False)  # type: ignore[untyped-decorator]
 def _rows(
     chain: Chain,
     group: int,
@@ -186,7 +188,7 @@ def _rows(
     d, singles, words, place = batch.d, batch.s, batch.w, batch.place
     xs, zs, margins, origins = level.x, level.z, level.margin, level.origin
     first_x, first_z, lever_x, lever_z = level.first_x, level.first_z, level.lever_x, level.lever_z
-    runs, some = (level.low, level.high), np.empty(RUN, np.uint8)
+    runs, some = (level.low, level.high), batch.some
     groups, sides, slabs = body.group, body.sides, body.slab
     of_slab, obstacles, lows, highs = polygons.slab, polygons.obstacle, polygons.low, polygons.high
     cells = cells_of(level)

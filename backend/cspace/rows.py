@@ -49,7 +49,13 @@ class Polygons(NamedTuple):
     high: Array
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True, _nrt=False)  # type: ignore[untyped-decorator]
+def _fill(words: AnyArray, value: np.uint64) -> None:
+    for w in range(len(words)):
+        words[w] = value
+
+
+@njit(cache=True, nogil=True, _nrt=False)  # type: ignore[untyped-decorator]
 def _range_word(first: int, last: int, word: int) -> np.uint64:
     """Bits first..last of the row that fall into this word."""
     low, high = max(first - 64 * word, 0), min(last - 64 * word, 63)
@@ -58,7 +64,7 @@ def _range_word(first: int, last: int, word: int) -> np.uint64:
     return (ALL << np.uint64(low)) & (ALL >> np.uint64(63 - high))
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True, _nrt=False)  # type: ignore[untyped-decorator]
 def _keep(center: float, half: float, step: float, cells: int, mask: AnyArray) -> None:
     """Clear the cells that are not within `half` of `center` (from the first cell), on the circle,
     both [rad].
@@ -75,7 +81,7 @@ def _keep(center: float, half: float, step: float, cells: int, mask: AnyArray) -
         mask[w] &= _range_word(first, last, w) | _range_word(first2, last2, w)
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True, _nrt=False)  # type: ignore[untyped-decorator]
 def _keep_beyond(
     c: float, radius: float, center: float, turn: float, step: float, cells: int, mask: AnyArray
 ) -> None:
@@ -86,12 +92,12 @@ def _keep_beyond(
         return
     half = math.acos(c / radius) - turn if c < radius else -1.0
     if half <= 0.0:
-        mask[:] = 0
+        _fill(mask, np.uint64(0))
     elif half < math.pi:
         _keep(center, half, step, cells, mask)
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True, _nrt=False)  # type: ignore[untyped-decorator]
 def touched(
     body: Profiles,
     b: int,
@@ -104,15 +110,17 @@ def touched(
     cells: int,
     margin: float,
     turn: float,
+    room: AnyArray,
     out: AnyArray,
 ) -> None:
-    """Set the bits of `out` where body b with its pivot at (px, pz) is not apart from polygon k.
+    """Set the bits of `out` (words,) where body b with its pivot at (px, pz) is not apart from polygon k.
 
     origin: angle of the first cell; step: from cell to cell [rad]. Bits beyond `cells` mean
-    nothing.
+    nothing. room: (2, words) to work.
     """
     corners, edges = body.sides[b], polygons.sides[k]
-    free, mask = np.zeros_like(out), np.empty_like(out)
+    free, mask, words = room[0], room[1], len(out)
+    _fill(free, np.uint64(0))
     inside = body.depth[b] <= 0.0
     for i in range(edges):
         c = polygons.offset[k, i] - polygons.normal_x[k, i] * px - polygons.normal_z[k, i] * pz
@@ -122,24 +130,27 @@ def touched(
         inside = inside and c >= 0.0
         if c >= body.depth[b] + SLACK:
             continue
-        mask[:] = ALL
+        _fill(mask, ALL)
         for v in range(corners):
             center = polygons.bearing[k, i] - body.bearing[b, v] - origin
             _keep_beyond(c, body.radius[b, v], center, turn, step, cells, mask)
-        free |= mask
+        for w in range(words):
+            free[w] |= mask[w]
     if inside:  # the pivot lies in both
-        out[:] = ALL
+        _fill(out, ALL)
         return
     for j in range(corners):
-        mask[:] = ALL
+        _fill(mask, ALL)
         for v in range(edges):
             x, z = polygons.x[k, v] - px, polygons.z[k, v] - pz
             center = math.atan2(z, x) - body.normal[b, j] - origin
             _keep_beyond(
                 body.offset[b, j] + margin, math.hypot(x, z), center, turn, step, cells, mask
             )
-        free |= mask
-    out |= ~free
+        for w in range(words):
+            free[w] |= mask[w]
+    for w in range(words):
+        out[w] |= ~free[w]
 
 
 @njit(cache=True, nogil=True, inline="always")  # type: ignore[untyped-decorator]

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from backend.cspace.exact_levels import EXACT, Level
+from backend.cspace.exact_levels import EXACT, RUN, Level
 from backend.cspace.planar_arm import Profiles
 from backend.cspace.rows import ALL, SLACK, Polygons
 from backend.cspace.rows_angles import ERROR, HALF_TURN
@@ -73,7 +73,8 @@ class Batch(NamedTuple):
     """Rows of one body and one polygon, and room to work, see rows_vector: doubles d, singles s and
     words w. place: (SIZE,) which rows of the image they are; shape: (10, v) of the body its
     corners' radius and bearing, its edges' offset and normal, see Profiles; then of the polygon x,
-    z, normal_x, normal_z, offset, bearing, see Polygons.
+    z, normal_x, normal_z, offset, bearing, see Polygons. some: (RUN,) and room: (3, words) for one
+    row, to work.
     """
 
     d: Array
@@ -81,6 +82,8 @@ class Batch(NamedTuple):
     w: AnyArray
     place: IntArray
     shape: Array
+    some: AnyArray
+    room: AnyArray
 
 
 class Sizes(NamedTuple):
@@ -101,6 +104,7 @@ def new_batch(words: int, corners: int) -> Batch:
     return Batch(
         np.zeros(AWAY + corners * SIZE), np.empty(CORNERS + 2 * corners * SIZE, np.float32),
         np.empty(words * WORD, np.uint64), np.empty(SIZE, np.int64), np.empty((10, corners)),
+        np.empty(RUN, np.uint8), np.empty((3, words), np.uint64),
     )  # fmt: skip
 
 

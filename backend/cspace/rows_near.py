@@ -85,7 +85,9 @@ def near_rows(
             m += RUN
             continue
         n = min(RUN, len(x) - m)
-        _meet(x, z, margin, first_x, first_z, done, m, n, around, swept, some)
+        if not _meet(x, z, margin, first_x, first_z, done, m, n, around, swept, some):
+            m += n
+            continue
         for k in range(n):
             # What is not wanted is written over by the next.
             d[X + count], d[Z + count], place[count] = x[m], z[m], m
@@ -101,10 +103,13 @@ def near_rows(
 def _meet(
     x: Array, z: Array, margin: Array, first_x: Array, first_z: Array, done: BoolArray, m: int,
     n: int, around: tuple[float, float, float, float], swept: Swept, some: AnyArray,
-) -> None:  # fmt: skip
-    """some: 1 for those of the rows m, m + 1, ... that `near_rows` wants, 0 for the others."""
+) -> bool:  # fmt: skip
+    """some: 1 for those of the rows m, m + 1, ... that `near_rows` wants, 0 for the others; whether
+    there are any.
+    """
     if m < 0 or n > RUN:
-        return
+        return False
+    any_row = False
     reach, (c1, s1, offset1), (c2, s2, offset2) = swept.reach, swept.ahead, swept.behind
     for k in range(n):
         r = m + k
@@ -118,4 +123,7 @@ def _meet(
         behind = min(nx * left, nx * right) + min(nz * below, nz * above) - offset2
         near = reach + more
         meet = (dx * dx + dz * dz <= near * near) & (max(ahead, behind) <= more)
-        some[k] = meet & (not done[r])
+        meet &= not done[r]
+        some[k] = meet
+        any_row |= meet
+    return any_row

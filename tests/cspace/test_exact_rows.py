@@ -82,7 +82,7 @@ def test_batch_is_the_same_as_row_by_row(
         sure[batch.place[:left]] = batch.s[DOUBT : DOUBT + left] >= 0.0
         for r in np.flatnonzero(sure):
             row = np.zeros(words, np.uint64)
-            rows.touched(body, b, p, 0, x[r], z[r], origin[r], step, cells, margins[r], turn, row)
+            rows.touched(body, b, p, 0, x[r], z[r], origin[r], step, cells, margins[r], turn, room, row)
             # A batch shortens the meeting of arcs, a single row each arc: never more is free.
             assert not (row & full & ~found[r]).any()
             if turn >= 0.0:
