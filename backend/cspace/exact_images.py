@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from backend.cspace.exact_kernel import Chain, full_words, swing_block
+from backend.cspace.exact_kernel import Chain, batch_of, full_words, swing_block
 from backend.cspace.exact_levels import COUNT, HALF, START, STEP, levels
 from backend.cspace.exact_slices import placed
 from backend.cspace.exact_upper import turned_touches
@@ -102,7 +102,7 @@ def image_kernel(
             out[s] = full
             s = taken(next_swing)
         return
-    level = levels(chain.links, axes, kind)
+    level, batch = levels(chain.links, axes, kind), batch_of(body, axes)
     pairs = np.ones((len(body.group), len(boxes[0])), np.bool_)
     s = taken(next_swing)
     while s < len(out):
@@ -113,7 +113,7 @@ def image_kernel(
             if not fresh:
                 out[s] = 0
             there = placed(boxes, _turned(chain.T_arm_root, angle))
-            swing_block(chain, body, there, pairs, level, axes[0, HALF], out[s])
+            swing_block(chain, body, there, pairs, level, axes[0, HALF], batch, out[s])
         s = taken(next_swing)
 
 
@@ -143,7 +143,7 @@ def self_kernel(
         still = axes.copy()
         for j in range(held):
             still[j, START], still[j, COUNT], still[j, HALF] = 0.0, 1.0, 0.0
-        level = levels(chain.links, still, kind)
+        level, batch = levels(chain.links, still, kind), batch_of(body, still)
         booms, sticks = int(still[1, COUNT]), int(still[2, COUNT])
         part = np.zeros((booms * sticks, len(full_words(int(still[3, COUNT])))), np.uint64)
         for s in range(first, len(out), every):
@@ -151,7 +151,7 @@ def self_kernel(
                 part[:] = 0
                 angle = still[0, START] + s * still[0, STEP] if held == 0 else 0.0
                 there = placed(boxes, _turned(chain.T_arm_root, angle))
-                swing_block(chain, body, there, pairs, level, still[0, HALF], part)
+                swing_block(chain, body, there, pairs, level, still[0, HALF], batch, part)
             if held == 4:
                 if part[0, 0] & np.uint64(1):
                     out[s] = full

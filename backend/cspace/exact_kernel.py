@@ -15,8 +15,8 @@ import numpy as np
 from numba import njit
 
 from backend.cspace.exact_boxes import gap
-from backend.cspace.exact_levels import EXACT, Level
-from backend.cspace.exact_slices import slices
+from backend.cspace.exact_levels import COUNT, EXACT, Level
+from backend.cspace.exact_slices import slices, slices_wanted
 from backend.cspace.planar_arm import Profiles
 from backend.cspace.rows import ALL, Polygons, touched
 from backend.cspace.rows_batch import (
@@ -31,6 +31,8 @@ from backend.cspace.rows_batch import (
 from backend.cspace.rows_near import near_rows, swept_of
 from backend.cspace.rows_vector import BLOCKED, DOUBT, MARGIN, ORIGIN, WORD, X, Z
 from backend.spatial.types import AnyArray, Array, BoolArray, IntArray
+
+_USUAL = 16  # more corners than most polygons have
 
 
 class Chain(NamedTuple):
@@ -129,14 +131,14 @@ def _decide(
 ) -> None:
     """Decide what is in doubt in the first `count` rows of a batch, or a box that is no prism."""
     d, words, size = batch.d, batch.w, len(full)
-    room, sure = batch.room[:2], batch.room[2]
+    room, sure = batch.room[:2, :size], batch.room[2, :size]
     for r in range(count):
         if batch.s[DOUBT + r] < 0.0:
             for w in range(size):
                 sure[w] = np.uint64(0)
             touched(
                 body, b, polygons, p, d[X + r], d[Z + r], d[ORIGIN + r], level.step,
-                level.cells, d[MARGIN + r], level.turn, room, sure,
+                level.cells, d[MARGIN + r], level.turn, room, batch.polar, sure,
             )  # fmt: skip
             for w in range(size):
                 words[w * WORD + BLOCKED + r] = sure[w]
@@ -237,6 +239,15 @@ def _pass_on(
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def batch_of(body: Profiles, axes: Array) -> Batch:
+    """Room for the rows of all joints, see Level, and polygons of usual size."""
+    words = 1
+    for joint in range(1, 4):
+        words = max(words, (int(axes[joint, COUNT]) + 63) // 64)
+    return new_batch(words, max(_USUAL, body.radius.shape[1]))
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def swing_block(
     chain: Chain,
     body: Profiles,
@@ -244,33 +255,31 @@ def swing_block(
     pairs: BoolArray,
     level: tuple[Level, Level, Level],
     spread: float,
+    batch: Batch,
     out: AnyArray,
 ) -> None:
     """One swing of an image. boxes: obstacles in the frame `arm` of that swing; spread: half a cell
-    of the swing [rad]; out: (boom * stick, words), 0.
+    of the swing [rad]; batch: see `batch_of`; out: (boom * stick, words), 0.
     """
     boom, stick, bucket = level
-    polygons = slices(body, boxes, pairs, boom.kind, spread, chain.pivots[0], chain.reach)
+    pivot = chain.pivots[0]
+    wanted, some = slices_wanted(body, boxes, pairs, boom.kind, spread, pivot, chain.reach)
+    if not some:
+        return
+    polygons = slices(body, boxes, wanted, boom.kind, spread, pivot)
     if len(polygons.slab) == 0:
         return
+    corners = polygons.x.shape[1]
+    if corners > batch.shape.shape[1]:
+        batch = new_batch(len(batch.w) // WORD, corners)
     full1, full2, full3 = full_words(boom.cells), full_words(stick.cells), full_words(bucket.cells)
-    corners = max(polygons.x.shape[1], body.radius.shape[1])
     row1, done1 = np.zeros((1, len(full1)), np.uint64), np.zeros(1, np.bool_)
-    _rows(
-        chain, 0, body, polygons, pairs, boxes, boom, done1, new_batch(len(full1), corners),
-        full1, row1,
-    )  # fmt: skip
+    _rows(chain, 0, body, polygons, pairs, boxes, boom, done1, batch, full1, row1)
     rows2, done2 = np.zeros((boom.cells, len(full2)), np.uint64), np.zeros(boom.cells, np.bool_)
     _pass_on(row1[0], boom.cells, 1, full2, done2, rows2)
-    _rows(
-        chain, 1, body, polygons, pairs, boxes, stick, done2, new_batch(len(full2), corners),
-        full2, rows2,
-    )  # fmt: skip
+    _rows(chain, 1, body, polygons, pairs, boxes, stick, done2, batch, full2, rows2)
     done3 = np.zeros(len(out), np.bool_)
     n = stick.cells
     for i in range(boom.cells):
         _pass_on(rows2[i], n, 1, full3, done3[i * n : (i + 1) * n], out[i * n : (i + 1) * n])
-    _rows(
-        chain, 2, body, polygons, pairs, boxes, bucket, done3, new_batch(len(full3), corners),
-        full3, out,
-    )  # fmt: skip
+    _rows(chain, 2, body, polygons, pairs, boxes, bucket, done3, batch, full3, out)

@@ -33,9 +33,10 @@ class Level(NamedTuple):
     bucket one for each cell of boom and stick.
 
     kind: EXACT, OUTER, INNER; x, z: (m,) pivots [m]; origin: (m,) angles of the first cells [rad],
-    first_x, first_z: (m,) and their directions; margin: (m,) how far a pivot can be from there [m]; turn: how far the angle can be from its
-    cell's [rad]; both below 0 for INNER. step, cells: of the rows. widest: the largest margin; low,
-    high: (runs, 2) bounds of the pivots of RUN rows.
+    first_x, first_z: (m,) and their directions; margin: (m,) how far a pivot can be from there [m],
+    0 when EXACT; turn: how far the angle can be from its cell's [rad]; both below 0 for INNER.
+    step, cells: of the rows. widest: the largest margin; low, high: (runs, 2) bounds of the pivots
+    of RUN rows.
 
     Along one direction a pivot moves less than in all: the boom turns it by up to `boom` about
     (boom_x, boom_z), the stick by up to `stick` about a point that is (lever_x, lever_z), (m,),
@@ -115,7 +116,7 @@ def levels(links: Array, axes: Array, kind: int) -> tuple[Level, Level, Level]:
             away = math.hypot(vx + wx, vz + wz) + l2 * half2
             margin2[k] = kind * (away * half1 + l2 * half2 + ROUNDING)
             lever_x[k], lever_z[k] = wx, wz
-    none = np.zeros(n1 if kind != EXACT else 0)
+    none0, none1 = np.zeros(min(levers, 1)), np.zeros(min(levers, n1))
     bend1 = 0.5 * l1 * half1 * half1 + ROUNDING
     bend2 = 0.5 * (l1 + l2) * half1 * half1 + l2 * half2 * (half1 + 0.5 * half2) + ROUNDING
     low0, high0, _ = _runs(x0, z0, margin0)
@@ -125,16 +126,16 @@ def levels(links: Array, axes: Array, kind: int) -> tuple[Level, Level, Level]:
     turn3 = kind * (half1 + half2 + half3 + ROUNDING)
     return (
         Level(
-            kind, x0, z0, origin0, first0[:1], first0[1:], margin0, np.zeros(1), np.zeros(1), ox, oz, 0.0, 0.0, ROUNDING,
-            turn1, axes[1, STEP], n1, max(margin0[0], 0.0), low0, high0,
+            kind, x0, z0, origin0, first0[:1], first0[1:], margin0, none0, none0, ox, oz, 0.0, 0.0,
+            ROUNDING, turn1, axes[1, STEP], n1, max(margin0[0], 0.0), low0, high0,
         ),
         Level(
-            kind, x1, z1, origin1, first1[0], first1[1], margin1, none, none, ox, oz, half1, 0.0, bend1,
-            turn2, axes[2, STEP], n2, widest1, low1, high1,
+            kind, x1, z1, origin1, first1[0], first1[1], margin1, none1, none1, ox, oz, half1,
+            0.0, bend1, turn2, axes[2, STEP], n2, widest1, low1, high1,
         ),
         Level(
-            kind, x2, z2, origin2, first2[0], first2[1], margin2, lever_x, lever_z, ox, oz, half1, half2, bend2,
-            turn3, axes[3, STEP], int(axes[3, COUNT]), widest2, low2, high2,
+            kind, x2, z2, origin2, first2[0], first2[1], margin2, lever_x, lever_z, ox, oz,
+            half1, half2, bend2, turn3, axes[3, STEP], int(axes[3, COUNT]), widest2, low2, high2,
         ),
     )  # fmt: skip
 

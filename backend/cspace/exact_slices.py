@@ -30,7 +30,7 @@ def placed(boxes: tuple[Array, Array, Array], T: Array) -> tuple[Array, Array, A
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def slices(
+def slices_wanted(
     body: Profiles,
     boxes: tuple[Array, Array, Array],
     pairs: BoolArray,
@@ -38,17 +38,17 @@ def slices(
     spread: float,
     pivot: Array,
     reach: Array,
-) -> Polygons:
-    """Polygons of all obstacles that the arm can meet, for every slab that needs them.
+) -> tuple[Array, bool]:
+    """How far from the pivot the slice of each slab and obstacle matters (s, m) [m], 0 where the
+    arm meets none; whether there are any.
 
     spread: half a cell of the swing [rad]; pivot: (2,) of the boom; reach: (3,) of the bodies of
     boom, stick and bucket from there [m].
     """
-    centers, rotations, halves = boxes
-    m, slabs = len(centers), len(body.slabs)
-    pad = ROUNDING * kind
-    wide = max(abs(body.slabs.min()), abs(body.slabs.max())) + abs(pad)
-    wanted = np.zeros((slabs, m))  # how far from the pivot a slice matters
+    centers, _, halves = boxes
+    m, slabs, some = len(centers), len(body.slabs), False
+    wide = max(abs(body.slabs.min()), abs(body.slabs.max())) + abs(ROUNDING * kind)
+    wanted = np.zeros((slabs, m))
     for j in range(m):
         size = math.sqrt(halves[j, 0] ** 2 + halves[j, 1] ** 2 + halves[j, 2] ** 2) + 1e-6
         x, t, z = centers[j, 0], centers[j, 1], centers[j, 2]
@@ -63,6 +63,25 @@ def slices(
             within = reach[body.group[b]]
             if body.sides[b] > 0 and pairs[b, j] and away - size <= within + wide:
                 wanted[body.slab[b], j] = max(wanted[body.slab[b], j], within)
+                some = True
+    return wanted, some
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def slices(
+    body: Profiles,
+    boxes: tuple[Array, Array, Array],
+    wanted: Array,
+    kind: int,
+    spread: float,
+    pivot: Array,
+) -> Polygons:
+    """Polygons of all obstacles that the arm can meet, for every slab that needs them; see
+    `slices_wanted`.
+    """
+    centers, rotations, halves = boxes
+    m, slabs = len(centers), len(body.slabs)
+    pad = ROUNDING * kind
     room = 0
     for s in range(slabs):
         for j in range(m):

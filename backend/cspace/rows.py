@@ -84,17 +84,19 @@ def _keep(center: float, half: float, step: float, cells: int, mask: AnyArray) -
 @njit(cache=True, nogil=True, _nrt=False)  # type: ignore[untyped-decorator]
 def _keep_beyond(
     c: float, radius: float, center: float, turn: float, step: float, cells: int, mask: AnyArray
-) -> None:
+) -> bool:
     """Clear the cells in which a corner at `radius` is not beyond a line at distance c; center: the
-    angle at which it is farthest.
+    angle at which it is farthest. Whether there may be others.
     """
     if c <= -radius:
-        return
+        return True
     half = math.acos(c / radius) - turn if c < radius else -1.0
     if half <= 0.0:
         _fill(mask, np.uint64(0))
-    elif half < math.pi:
+        return False
+    if half < math.pi:
         _keep(center, half, step, cells, mask)
+    return True
 
 
 @njit(cache=True, nogil=True, _nrt=False)  # type: ignore[untyped-decorator]
@@ -111,12 +113,14 @@ def touched(
     margin: float,
     turn: float,
     room: AnyArray,
+    polar: Array,
     out: AnyArray,
 ) -> None:
-    """Set the bits of `out` (words,) where body b with its pivot at (px, pz) is not apart from polygon k.
+    """Set the bits of `out` (words,) where body b with its pivot at (px, pz) is not apart from
+    polygon k.
 
     origin: angle of the first cell; step: from cell to cell [rad]. Bits beyond `cells` mean
-    nothing. room: (2, words) to work.
+    nothing. room: (2, words), polar: (2, v) to work.
     """
     corners, edges = body.sides[b], polygons.sides[k]
     free, mask, words = room[0], room[1], len(out)
@@ -133,20 +137,27 @@ def touched(
         _fill(mask, ALL)
         for v in range(corners):
             center = polygons.bearing[k, i] - body.bearing[b, v] - origin
-            _keep_beyond(c, body.radius[b, v], center, turn, step, cells, mask)
+            if not _keep_beyond(c, body.radius[b, v], center, turn, step, cells, mask):
+                break
         for w in range(words):
             free[w] |= mask[w]
     if inside:  # the pivot lies in both
         _fill(out, ALL)
         return
+    nearest = math.inf
+    for v in range(edges):
+        x, z = polygons.x[k, v] - px, polygons.z[k, v] - pz
+        polar[0, v], polar[1, v] = math.hypot(x, z), math.atan2(z, x)
+        nearest = min(nearest, polar[0, v])
     for j in range(corners):
+        e = body.offset[b, j] + margin
+        if e >= nearest:
+            continue  # that corner is never beyond this edge
         _fill(mask, ALL)
         for v in range(edges):
-            x, z = polygons.x[k, v] - px, polygons.z[k, v] - pz
-            center = math.atan2(z, x) - body.normal[b, j] - origin
-            _keep_beyond(
-                body.offset[b, j] + margin, math.hypot(x, z), center, turn, step, cells, mask
-            )
+            center = polar[1, v] - body.normal[b, j] - origin
+            if not _keep_beyond(e, polar[0, v], center, turn, step, cells, mask):
+                break
         for w in range(words):
             free[w] |= mask[w]
     for w in range(words):

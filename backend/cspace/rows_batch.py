@@ -73,8 +73,8 @@ class Batch(NamedTuple):
     """Rows of one body and one polygon, and room to work, see rows_vector: doubles d, singles s and
     words w. place: (SIZE,) which rows of the image they are; shape: (10, v) of the body its
     corners' radius and bearing, its edges' offset and normal, see Profiles; then of the polygon x,
-    z, normal_x, normal_z, offset, bearing, see Polygons. some: (RUN,) and room: (3, words) for one
-    row, to work.
+    z, normal_x, normal_z, offset, bearing, see Polygons. polar: (2, v), some: (RUN,) and
+    room: (3, words) to work.
     """
 
     d: Array
@@ -82,6 +82,7 @@ class Batch(NamedTuple):
     w: AnyArray
     place: IntArray
     shape: Array
+    polar: Array
     some: AnyArray
     room: AnyArray
 
@@ -104,6 +105,7 @@ def new_batch(words: int, corners: int) -> Batch:
     return Batch(
         np.zeros(AWAY + corners * SIZE), np.empty(CORNERS + 2 * corners * SIZE, np.float32),
         np.empty(words * WORD, np.uint64), np.empty(SIZE, np.int64), np.empty((10, corners)),
+        np.empty((2, corners)),
         np.empty(RUN, np.uint8), np.empty((3, words), np.uint64),
     )  # fmt: skip
 
@@ -179,7 +181,7 @@ def touched_rows(
     fill(s, DOUBT, n, np.float32(math.inf))
     fill(d, NEAREST, n, math.inf)
     front = _beyond_polygon(sizes, cells, d, s, w, batch.shape, n)
-    count = _kept(d, s, w, batch.place, count, full, known, cells.close)
+    count = _kept(d, s, w, batch.place, count, full, known, cells.close, cells.moves[0] != EXACT)
     if count == 0:
         return 0
     _beyond_body(sizes, cells, d, s, w, batch.shape, _fill(d, count), front)
@@ -205,16 +207,22 @@ def _kept(
     full: AnyArray,
     known: AnyArray,
     close: float,
+    moves: bool,
 ) -> int:
-    """Move the rows in which more than `known` may be blocked to the front; how many."""
+    """Move the rows in which more than `known` may be blocked to the front; how many. moves: their
+    pivots do.
+    """
     words, kept = len(full), 0
     for r in range(count):
         some, m = s[DOUBT + r] < close, place[r]
         for word in range(words):
             some |= w[word * WORD + BLOCKED + r] & full[word] & ~known[m, word] != 0
         # What is not kept is written over by the next.
-        for value in (X, Z, ORIGIN, MARGIN, LEVER_X, LEVER_Z, NEAREST):
+        for value in (X, Z, ORIGIN, NEAREST):
             d[value + kept] = d[value + r]
+        if moves:
+            for value in (MARGIN, LEVER_X, LEVER_Z):
+                d[value + kept] = d[value + r]
         s[DOUBT + kept], place[kept] = s[DOUBT + r], m
         for word in range(words):
             w[word * WORD + BLOCKED + kept] = w[word * WORD + BLOCKED + r]

@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numpy as np
 from numba import njit
 
 from backend.cspace.exact_levels import RUN, Level
@@ -91,8 +90,9 @@ def near_rows(
         for k in range(n):
             # What is not wanted is written over by the next.
             d[X + count], d[Z + count], place[count] = x[m], z[m], m
-            d[ORIGIN + count], d[MARGIN + count] = origin[m], margin[m]
-            if levers:
+            d[ORIGIN + count] = origin[m]
+            if levers:  # else margins are 0, as they are from the beginning
+                d[MARGIN + count] = margin[m]
                 d[LEVER_X + count], d[LEVER_Z + count] = lever_x[m], lever_z[m]
             count += some[k]
             m += 1

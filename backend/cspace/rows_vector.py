@@ -25,7 +25,7 @@ from backend.cspace.rows import ALL
 from backend.cspace.rows_angles import ERROR, HALF_TURN, ZERO, arc_cosine, bearing
 from backend.spatial.types import AnyArray, Array
 
-SIZE = 128
+SIZE = 256
 """Rows of a batch: what they need stays in the cache."""
 
 X, Z, ORIGIN, MARGIN, LEVER_X, LEVER_Z, NEAREST, LINE, AWAY = range(0, 9 * SIZE, SIZE)

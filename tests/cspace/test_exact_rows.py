@@ -55,8 +55,8 @@ def test_batch_is_the_same_as_row_by_row(
     # Pivots that can be off by `margin` any way: what bends is all of it.
     none, kind = np.zeros(0), int(np.sign(margin))
     level = Level(
-        kind, none, none, none, none, none, none, 0.0, 0.0, 0.0, 0.0, np.inf, turn, step, cells,
-        margin, none.reshape(0, 2), none.reshape(0, 2),
+        kind, none, none, none, none, none, none, none, none, 0.0, 0.0, 0.0, 0.0, np.inf, turn,
+        step, cells, margin, none.reshape(0, 2), none.reshape(0, 2),
     )  # fmt: skip
     compared = blocked = 0
     for case in range(60):
@@ -74,7 +74,8 @@ def test_batch_is_the_same_as_row_by_row(
         sizes = Sizes(
             int(body.sides[b]), float(body.depth[b]), float(body.reach[b]), int(p.sides[0]), words
         )
-        left = touched_rows(sizes, cells_of(level), batch, count, full)
+        known = np.zeros((count, words), np.uint64)
+        left = touched_rows(sizes, cells_of(level), batch, count, full, known)
         found = np.zeros((count, words), np.uint64)
         bits = np.array([batch.w[k * WORD + BLOCKED :][:left] for k in range(words)])
         found[batch.place[:left]] = bits.T & full
@@ -82,7 +83,10 @@ def test_batch_is_the_same_as_row_by_row(
         sure[batch.place[:left]] = batch.s[DOUBT : DOUBT + left] >= 0.0
         for r in np.flatnonzero(sure):
             row = np.zeros(words, np.uint64)
-            rows.touched(body, b, p, 0, x[r], z[r], origin[r], step, cells, margins[r], turn, room, row)
+            rows.touched(
+                body, b, p, 0, x[r], z[r], origin[r], step, cells, margins[r], turn, batch.room[:2],
+                batch.polar, row,
+            )  # fmt: skip
             # A batch shortens the meeting of arcs, a single row each arc: never more is free.
             assert not (row & full & ~found[r]).any()
             if turn >= 0.0:
