@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+from backend.cspace.least import greatest, least
 from backend.cspace.rows import ALL
 from backend.cspace.rows_angles import ERROR, HALF_TURN, ZERO, arc_cosine, bearing
 from backend.spatial.types import AnyArray, Array
@@ -53,6 +54,9 @@ _BEYOND = 0.6  # of a cell, beyond the ends of a row
 _DROP, _DROP_SINGLE = 1.5 * 2.0**52, np.float32(1.5 * 2.0**23)
 _FAR = 1 << 20  # no list begins farther from the array's beginning
 
+FUSED = {"contract"}
+"""Products and sums in one instruction, rounded once."""
+
 
 @njit(cache=True, nogil=True, _nrt=False)  # type: ignore[untyped-decorator]
 def fill(values: AnyArray, begin: int, n: int, value: Any) -> None:
@@ -63,13 +67,13 @@ def fill(values: AnyArray, begin: int, n: int, value: Any) -> None:
         values[begin + r] = value
 
 
-@njit(cache=True, nogil=True, _nrt=False, fastmath={"nnan", "nsz"})  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True, _nrt=False)  # type: ignore[untyped-decorator]
 def extremes(d: Array, begin: int, n: int) -> tuple[float, float]:
     """Smallest and greatest of n doubles from `begin`."""
     low = high = d[begin]
     if n <= SIZE and 0 <= begin < _FAR:
         for r in range(n):
-            low, high = min(low, d[begin + r]), max(high, d[begin + r])
+            low, high = least(low, d[begin + r]), greatest(high, d[begin + r])
     return low, high
 
 
@@ -98,7 +102,7 @@ def lines_within(
         d[LINE + r] += sign * min(by_boom + by_stick + bend, sign * d[MARGIN + r])
 
 
-@njit(cache=True, nogil=True, _nrt=False, fastmath={"nnan", "nsz"})  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True, _nrt=False)  # type: ignore[untyped-decorator]
 def nearer(d: Array, n: int, limit: float) -> tuple[float, float]:
     """Lower NEAREST to LINE. The smallest of LINE, and the greatest under the limit, -1e300 when
     there is none.
@@ -107,8 +111,8 @@ def nearer(d: Array, n: int, limit: float) -> tuple[float, float]:
     if n <= SIZE:
         for r in range(n):
             line = d[LINE + r]
-            d[NEAREST + r] = min(d[NEAREST + r], line)
-            low, high = min(low, line), max(high, line if line < limit else -1e300)
+            d[NEAREST + r] = least(d[NEAREST + r], line)
+            low, high = least(low, line), greatest(high, line if line < limit else -1e300)
     return low, high
 
 
@@ -168,7 +172,7 @@ def before_edge(d: Array, s: AnyArray, n: int, v: int, offset: float) -> None:
         s[RATIO + r] = e * s[inverse + r]
 
 
-@njit(cache=True, nogil=True, _nrt=False)  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True, _nrt=False, fastmath=FUSED)  # type: ignore[untyped-decorator]
 def arcs(
     s: AnyArray, n: int, base: int, away: float, turn: float, scale: float, period: float,
     low_end: float, high_end: float, other: bool,
@@ -182,7 +186,7 @@ def arcs(
         return
     aside, more, size = np.float32(away), np.float32(turn), np.float32(scale)
     around, turns = np.float32(period), np.float32(1.0 / period)
-    least, most = np.float32(low_end - _BEYOND), np.float32(high_end + _BEYOND)
+    lowest, most = np.float32(low_end - _BEYOND), np.float32(high_end + _BEYOND)
     for r in range(n):
         c = s[base + r] + aside
         c -= around * ((c * turns + _DROP_SINGLE) - _DROP_SINGLE)
@@ -194,7 +198,7 @@ def arcs(
         h = _ALL_AROUND if h >= _WHOLE_TURN else h
         # What is always or never beyond the line is known in double precision.
         h = (h if left > ZERO else (_ALL_AROUND if ratio > ZERO else _NO_ARC)) * size
-        s[FIRST + r], s[LAST + r] = max(c - h, least), min(c + h, most)
+        s[FIRST + r], s[LAST + r] = max(c - h, lowest), min(c + h, most)
     for r in range(n):  # on its own it keeps more in registers
         low, high = s[FIRST + r], s[LAST + r]
         at, to = (low + _DROP_SINGLE) - _DROP_SINGLE, (high + _DROP_SINGLE) - _DROP_SINGLE
@@ -213,7 +217,7 @@ def remaining(d: Array, s: AnyArray, n: int, v: int, offset: float) -> None:
         s[LEFT + r] = d[away + r] - (d[MARGIN + r] + offset)
 
 
-@njit(cache=True, nogil=True, _nrt=False)  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True, _nrt=False, fastmath=FUSED)  # type: ignore[untyped-decorator]
 def narrow(s: AnyArray, n: int, v: int) -> None:
     """Raise START and lower END to the directions of the normals between which corner v lies beyond
     an edge that it is farther away than by LEFT.
@@ -231,7 +235,7 @@ def narrow(s: AnyArray, n: int, v: int) -> None:
         s[END + r] = min(s[END + r], s[at + r] + h)
 
 
-@njit(cache=True, nogil=True, _nrt=False)  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True, _nrt=False, fastmath=FUSED)  # type: ignore[untyped-decorator]
 def between(
     s: AnyArray, n: int, away: float, turn: float, scale: float, period: float, low_end: float,
     high_end: float, other: bool,
@@ -243,7 +247,7 @@ def between(
         return
     aside, less, size = np.float32(away), np.float32(turn), np.float32(abs(scale))
     around, turns, half = np.float32(period), np.float32(1.0 / period), np.float32(0.5 * scale)
-    least, most = np.float32(low_end - _BEYOND), np.float32(high_end + _BEYOND)
+    lowest, most = np.float32(low_end - _BEYOND), np.float32(high_end + _BEYOND)
     for r in range(n):
         start, end = s[START + r], s[END + r]
         h = (_HALF * (end - start) - less if end - start > _NEARLY else _NO_ARC) * size
@@ -251,7 +255,7 @@ def between(
         c -= around * ((c * turns + _DROP_SINGLE) - _DROP_SINGLE)
         if other:
             c += -around if c > ZERO else around
-        low, high = max(c - h, least), min(c + h, most)
+        low, high = max(c - h, lowest), min(c + h, most)
         at, to = (low + _DROP_SINGLE) - _DROP_SINGLE, (high + _DROP_SINGLE) - _DROP_SINGLE
         s[FIRST + r] = at if at > low else at + _ONE
         s[LAST + r] = to if to < high else to - _ONE
@@ -267,7 +271,7 @@ def towards(d: Array, s: AnyArray, n: int, px: float, pz: float, begin: int) -> 
         s[begin + r], s[begin + SIZE + r] = px - d[X + r], pz - d[Z + r]
 
 
-@njit(cache=True, nogil=True, _nrt=False)  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True, _nrt=False, fastmath=FUSED)  # type: ignore[untyped-decorator]
 def bearings(s: AnyArray, n: int) -> None:
     """START: directions of (UX, UZ)."""
     if n > SIZE:
@@ -276,7 +280,7 @@ def bearings(s: AnyArray, n: int) -> None:
         s[START + r] = bearing(s[UX + r], s[UZ + r])
 
 
-@njit(cache=True, nogil=True, _nrt=False, error_model="numpy")  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True, _nrt=False, fastmath=FUSED, error_model="numpy")  # type: ignore[untyped-decorator]
 def corner_directions(s: AnyArray, n: int, v: int) -> None:
     """Of corner v, to which (VX, VZ) lead: one over its distance, and its direction from that of
     (UX, UZ).
@@ -301,14 +305,14 @@ def corner_distances(d: Array, n: int, v: int, px: float, pz: float) -> None:
         d[away + r] = math.sqrt(dx * dx + dz * dz)
 
 
-@njit(cache=True, nogil=True, _nrt=False, fastmath={"nnan", "nsz"})  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True, _nrt=False)  # type: ignore[untyped-decorator]
 def nearest(d: Array, n: int, v: int) -> None:
     """Lower LINE to how far corner v is beyond the margin."""
     if n > SIZE or v < 0 or v > SIZE:
         return
     away = AWAY + v * SIZE
     for r in range(n):
-        d[LINE + r] = min(d[LINE + r], d[away + r] - d[MARGIN + r])
+        d[LINE + r] = least(d[LINE + r], d[away + r] - d[MARGIN + r])
 
 
 @njit(cache=True, nogil=True, _nrt=False)  # type: ignore[untyped-decorator]
