@@ -17,6 +17,7 @@ from backend.cspace.exact_levels import COUNT, HALF, START, STEP, levels
 from backend.cspace.exact_slices import placed
 from backend.cspace.exact_upper import turned_touches
 from backend.cspace.planar_arm import Profiles
+from backend.cspace.rows_near import swept_of
 from backend.cspace.taking_turns import taken
 from backend.spatial.types import AnyArray, Array, BoolArray, IntArray
 
@@ -103,6 +104,7 @@ def image_kernel(
             s = taken(next_swing)
         return
     level, batch = levels(chain.links, axes, kind), batch_of(body, axes)
+    swept = swept_of(body, level)
     pairs = np.ones((len(body.group), len(boxes[0])), np.bool_)
     s = taken(next_swing)
     while s < len(out):
@@ -113,7 +115,7 @@ def image_kernel(
             if not fresh:
                 out[s] = 0
             there = placed(boxes, _turned(chain.T_arm_root, angle))
-            swing_block(chain, body, there, pairs, level, axes[0, HALF], batch, out[s])
+            swing_block(chain, body, there, pairs, level, swept, axes[0, HALF], batch, out[s])
         s = taken(next_swing)
 
 
@@ -144,6 +146,7 @@ def self_kernel(
         for j in range(held):
             still[j, START], still[j, COUNT], still[j, HALF] = 0.0, 1.0, 0.0
         level, batch = levels(chain.links, still, kind), batch_of(body, still)
+        swept = swept_of(body, level)
         booms, sticks = int(still[1, COUNT]), int(still[2, COUNT])
         part = np.zeros((booms * sticks, len(full_words(int(still[3, COUNT])))), np.uint64)
         for s in range(first, len(out), every):
@@ -151,7 +154,7 @@ def self_kernel(
                 part[:] = 0
                 angle = still[0, START] + s * still[0, STEP] if held == 0 else 0.0
                 there = placed(boxes, _turned(chain.T_arm_root, angle))
-                swing_block(chain, body, there, pairs, level, still[0, HALF], batch, part)
+                swing_block(chain, body, there, pairs, level, swept, still[0, HALF], batch, part)
             if held == 4:
                 if part[0, 0] & np.uint64(1):
                     out[s] = full

@@ -15,7 +15,7 @@ import numpy as np
 from numba import njit
 
 from backend.cspace.exact_boxes import gap
-from backend.cspace.exact_levels import COUNT, EXACT, Level
+from backend.cspace.exact_levels import COUNT, EXACT, RUN, Level
 from backend.cspace.exact_slices import slices, slices_wanted
 from backend.cspace.planar_arm import Profiles
 from backend.cspace.rows import ALL, Polygons, touched
@@ -28,7 +28,7 @@ from backend.cspace.rows_batch import (
     set_polygon,
     touched_rows,
 )
-from backend.cspace.rows_near import near_rows, swept_of
+from backend.cspace.rows_near import near_rows, near_runs
 from backend.cspace.rows_vector import BLOCKED, DOUBT, MARGIN, ORIGIN, WORD, X, Z
 from backend.spatial.types import AnyArray, Array, BoolArray, IntArray
 
@@ -151,7 +151,7 @@ def _decide(
 def _doubted(s: AnyArray, count: int) -> bool:
     some = False
     for r in range(count):
-        some = some or s[DOUBT + r] < 0.0
+        some |= s[DOUBT + r] < 0.0
     return some
 
 
@@ -178,6 +178,7 @@ def _rows(
     pairs: BoolArray,
     boxes: tuple[Array, Array, Array],
     level: Level,
+    swept: Array,
     done: BoolArray,
     batch: Batch,
     full: AnyArray,
@@ -186,11 +187,9 @@ def _rows(
     """Set the bits of out (m, words) that the bodies of the group block, but for rows `done`; rows
     that get full are done, too.
     """
-    # Arrays are taken out of tuples before loops: each time that is done, their uses are counted.
     d, singles, words, place = batch.d, batch.s, batch.w, batch.place
-    xs, zs, margins, origins = level.x, level.z, level.margin, level.origin
-    first_x, first_z, lever_x, lever_z = level.first_x, level.first_z, level.lever_x, level.lever_z
-    runs, some = (level.low, level.high), batch.some
+    rows, runs, some, found = level.rows, level.runs, batch.some, batch.found
+    moves = level.kind != EXACT
     groups, sides, slabs = body.group, body.sides, body.slab
     of_slab, obstacles, lows, highs = polygons.slab, polygons.obstacle, polygons.low, polygons.high
     cells = cells_of(level)
@@ -201,19 +200,19 @@ def _rows(
             if groups[b] != group or sides[b] == 0 or late != (turn == 1):
                 continue
             set_body(batch, body, b)
-            swept, depth = swept_of(body, b, level), body.depth[b]
+            reach, depth = body.reach[b], body.depth[b]
+            lines = (swept[b, 0], swept[b, 1], swept[b, 2], swept[b, 3], swept[b, 4], swept[b, 5])
             for p in range(len(of_slab)):
                 if of_slab[p] != slabs[b] or not pairs[b, obstacles[p]]:
                     continue
                 set_polygon(batch, polygons, p)
-                sizes = Sizes(sides[b], depth, swept.reach, polygons.sides[p], len(full))
+                sizes = Sizes(sides[b], depth, reach, polygons.sides[p], len(full))
                 around = (lows[p, 0], lows[p, 1], highs[p, 0], highs[p, 1])
-                m = 0
-                while m < len(xs):
-                    count, m = near_rows(
-                        xs, zs, origins, margins, first_x, first_z, lever_x, lever_z, runs, around,
-                        swept, level.widest, done, m, d, place, some,
-                    )  # fmt: skip
+                near, at = near_runs(runs, around, reach + level.widest, some, found), 0
+                while at < near:
+                    count, at = near_rows(
+                        rows, found, near, at, around, reach, lines, moves, done, d, place, some
+                    )
                     if count == 0:
                         continue
                     count = touched_rows(sizes, cells, batch, count, full, out)
@@ -244,7 +243,8 @@ def batch_of(body: Profiles, axes: Array) -> Batch:
     words = 1
     for joint in range(1, 4):
         words = max(words, (int(axes[joint, COUNT]) + 63) // 64)
-    return new_batch(words, max(_USUAL, body.radius.shape[1]))
+    rows = int(axes[1, COUNT]) * int(axes[2, COUNT])
+    return new_batch(words, max(_USUAL, body.radius.shape[1]), rows // RUN + 1)
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
@@ -254,12 +254,13 @@ def swing_block(
     boxes: tuple[Array, Array, Array],
     pairs: BoolArray,
     level: tuple[Level, Level, Level],
+    swept: Array,
     spread: float,
     batch: Batch,
     out: AnyArray,
 ) -> None:
     """One swing of an image. boxes: obstacles in the frame `arm` of that swing; spread: half a cell
-    of the swing [rad]; batch: see `batch_of`; out: (boom * stick, words), 0.
+    of the swing [rad]; swept: see `swept_of`; batch: see `batch_of`; out: (boom * stick, words), 0.
     """
     boom, stick, bucket = level
     pivot = chain.pivots[0]
@@ -271,15 +272,18 @@ def swing_block(
         return
     corners = polygons.x.shape[1]
     if corners > batch.shape.shape[1]:
-        batch = new_batch(len(batch.w) // WORD, corners)
+        batch = new_batch(len(batch.w) // WORD, corners, len(batch.found))
     full1, full2, full3 = full_words(boom.cells), full_words(stick.cells), full_words(bucket.cells)
-    row1, done1 = np.zeros((1, len(full1)), np.uint64), np.zeros(1, np.bool_)
-    _rows(chain, 0, body, polygons, pairs, boxes, boom, done1, batch, full1, row1)
-    rows2, done2 = np.zeros((boom.cells, len(full2)), np.uint64), np.zeros(boom.cells, np.bool_)
+    row1, done1 = np.zeros((1, len(full1)), np.uint64), np.zeros(boom.rows.shape[1], np.bool_)
+    _rows(chain, 0, body, polygons, pairs, boxes, boom, swept, done1, batch, full1, row1)
+    rows2, done2 = (
+        np.zeros((boom.cells, len(full2)), np.uint64),
+        np.zeros(stick.rows.shape[1], np.bool_),
+    )
     _pass_on(row1[0], boom.cells, 1, full2, done2, rows2)
-    _rows(chain, 1, body, polygons, pairs, boxes, stick, done2, batch, full2, rows2)
-    done3 = np.zeros(len(out), np.bool_)
+    _rows(chain, 1, body, polygons, pairs, boxes, stick, swept, done2, batch, full2, rows2)
+    done3 = np.zeros(bucket.rows.shape[1], np.bool_)
     n = stick.cells
     for i in range(boom.cells):
         _pass_on(rows2[i], n, 1, full3, done3[i * n : (i + 1) * n], out[i * n : (i + 1) * n])
-    _rows(chain, 2, body, polygons, pairs, boxes, bucket, done3, batch, full3, out)
+    _rows(chain, 2, body, polygons, pairs, boxes, bucket, swept, done3, batch, full3, out)

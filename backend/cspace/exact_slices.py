@@ -54,11 +54,11 @@ def slices_wanted(
         x, t, z = centers[j, 0], centers[j, 1], centers[j, 2]
         beside = abs(t) * math.cos(spread) - abs(x) * math.sin(spread) - size
         # Within the cell the swing moves a point on a circle about z.
+        if beside > wide:
+            continue
         away = math.hypot(max(abs(math.hypot(x, t) - abs(pivot[0])) - wide, 0.0), z - pivot[1])
         if spread == 0.0:
             away = math.hypot(x - pivot[0], z - pivot[1]) - wide
-        if beside > wide:
-            continue
         for b in range(len(body.group)):
             within = reach[body.group[b]]
             if body.sides[b] > 0 and pairs[b, j] and away - size <= within + wide:

@@ -73,8 +73,8 @@ class Batch(NamedTuple):
     """Rows of one body and one polygon, and room to work, see rows_vector: doubles d, singles s and
     words w. place: (SIZE,) which rows of the image they are; shape: (10, v) of the body its
     corners' radius and bearing, its edges' offset and normal, see Profiles; then of the polygon x,
-    z, normal_x, normal_z, offset, bearing, see Polygons. polar: (2, v), some: (RUN,) and
-    room: (3, words) to work.
+    z, normal_x, normal_z, offset, bearing, see Polygons. polar: (2, v), some and found: (runs,),
+    and room: (3, words) to work.
     """
 
     d: Array
@@ -84,12 +84,13 @@ class Batch(NamedTuple):
     shape: Array
     polar: Array
     some: AnyArray
+    found: IntArray
     room: AnyArray
 
 
 class Sizes(NamedTuple):
     """Of a body its corners, depth and reach, see Profiles; of a polygon its corners; words of a
-    row. Arrays that are passed on are counted each time, which takes long: there are none here.
+    row.
     """
 
     sides: int
@@ -100,13 +101,13 @@ class Sizes(NamedTuple):
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def new_batch(words: int, corners: int) -> Batch:
-    """An empty batch for rows of `words`, and bodies and polygons of up to `corners`."""
+def new_batch(words: int, corners: int, runs: int) -> Batch:
+    """An empty batch for rows of `words` in `runs`, bodies and polygons of up to `corners`."""
     return Batch(
         np.zeros(AWAY + corners * SIZE), np.empty(CORNERS + 2 * corners * SIZE, np.float32),
         np.empty(words * WORD, np.uint64), np.empty(SIZE, np.int64), np.empty((10, corners)),
-        np.empty((2, corners)),
-        np.empty(RUN, np.uint8), np.empty((3, words), np.uint64),
+        np.empty((2, corners)), np.empty(max(runs, RUN), np.uint8), np.empty(runs, np.int64),
+        np.empty((3, words), np.uint64),
     )  # fmt: skip
 
 

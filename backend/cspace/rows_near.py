@@ -8,49 +8,57 @@ turn with the row.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
+import numpy as np
 from numba import njit
 
-from backend.cspace.exact_levels import RUN, Level
+from backend.cspace.exact_levels import (
+    FIRST_X_ROW,
+    FIRST_Z_ROW,
+    LEVER_X_ROW,
+    LEVER_Z_ROW,
+    MARGIN_ROW,
+    ORIGIN_ROW,
+    RUN,
+    X_ROW,
+    Z_ROW,
+    Level,
+)
 from backend.cspace.planar_arm import Profiles
 from backend.cspace.rows_vector import LEVER_X, LEVER_Z, MARGIN, ORIGIN, SIZE, X, Z
 from backend.spatial.types import AnyArray, Array, BoolArray, IntArray
 
 _SLACK = 1e-9  # [m] more than rounding moves anything here
-
-
-class Swept(NamedTuple):
-    """What holds a body in all cells of a row, about its pivot: the disc of `reach`, and the
-    half-planes n . x <= offset ahead of the last cell and behind the first; the normals n are the
-    direction of the row's first cell turned by an angle with this cosine and sine.
-    """
-
-    reach: float
-    ahead: tuple[float, float, float]
-    behind: tuple[float, float, float]
+Swept = tuple[float, float, float, float, float, float]
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def swept_of(body: Profiles, b: int, level: Level) -> Swept:
-    """Of body b; with all that the angle can differ from its cell's, see Level."""
-    way = math.copysign(1.0, level.step)
-    span, more = abs(level.step) * (level.cells - 1), abs(level.turn)
-    ahead, behind = (1.0, 0.0, math.inf), (1.0, 0.0, math.inf)
-    for j in range(body.sides[b]):
-        normal = body.normal[b, j]
-        # Ahead, the line turns with the last cell; seen from the body, it comes from farther on.
-        offset = _support(body, b, normal, way * (span + more), -way * more)
-        if offset < ahead[2]:
-            turn = normal + way * span
-            ahead = (math.cos(turn), math.sin(turn), offset + _SLACK)
-        offset = _support(body, b, normal, -way * (span + more), way * more)
-        if offset < behind[2]:
-            behind = (math.cos(normal), math.sin(normal), offset + _SLACK)
-    return Swept(body.reach[b], ahead, behind)
+def swept_of(body: Profiles, level: tuple[Level, Level, Level]) -> Array:
+    """(n, 6) half-planes n . x <= offset about the pivot that hold a body in all cells of a row:
+    ahead of the last one and behind the first. Of each the cosine and sine of the angle from the
+    direction of the row's first cell to n, and the offset [m].
+    """
+    out = np.empty((len(body.group), 6))
+    for b in range(len(out)):
+        of = level[0] if body.group[b] == 0 else level[1] if body.group[b] == 1 else level[2]
+        way = math.copysign(1.0, of.step)
+        # With all that the angle can differ from its cell's.
+        span, more = abs(of.step) * (of.cells - 1), abs(of.turn)
+        out[b] = (1.0, 0.0, math.inf, 1.0, 0.0, math.inf)
+        for j in range(body.sides[b]):
+            normal = body.normal[b, j]
+            # Seen from the body, a line that turns with the last cell comes from farther on.
+            offset = _support(body, b, normal, way * (span + more), -way * more)
+            if offset < out[b, 2]:
+                turn = normal + way * span
+                out[b, :3] = (math.cos(turn), math.sin(turn), offset + _SLACK)
+            offset = _support(body, b, normal, -way * (span + more), way * more)
+            if offset < out[b, 5]:
+                out[b, 3:] = (math.cos(normal), math.sin(normal), offset + _SLACK)
+    return out
 
 
-@njit(cache=True, nogil=True, _nrt=False)  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _support(body: Profiles, b: int, normal: float, far: float, near: float) -> float:
     """How far the body reaches in any direction from normal + near to normal + far."""
     middle, half = normal + 0.5 * (far + near), 0.5 * abs(far - near)
@@ -58,72 +66,77 @@ def _support(body: Profiles, b: int, normal: float, far: float, near: float) -> 
     for v in range(body.sides[b]):
         off = abs(body.bearing[b, v] - middle) % (2.0 * math.pi)
         off = max(min(off, 2.0 * math.pi - off) - half, 0.0)
-        most = max(most, body.radius[b, v] * math.cos(min(off, math.pi)))
+        most = max(most, body.radius[b, v] * math.cos(off))
     return most
 
 
 @njit(cache=True, nogil=True, _nrt=False)  # type: ignore[untyped-decorator]
-def near_rows(
-    x: Array, z: Array, origin: Array, margin: Array, first_x: Array, first_z: Array,
-    lever_x: Array, lever_z: Array, runs: tuple[Array, Array],
-    around: tuple[float, float, float, float], swept: Swept, widest: float, done: BoolArray,
-    m: int, d: Array, place: IntArray, some: AnyArray,
-) -> tuple[int, int]:  # fmt: skip
-    """Fill a batch with the rows from m on in which the body can meet what is within the rectangle
-    `around`: left, below, right, above; but for rows `done`. How many, and where to go on. See
-    Level. some: (RUN,) room to work.
+def near_runs(
+    runs: Array, around: tuple[float, float, float, float], within: float, some: AnyArray,
+    found: IntArray,
+) -> int:  # fmt: skip
+    """Put the runs that are `within` a distance of the rectangle `around` into `found`, (r,): left,
+    below, right, above; how many. some: (r,) room to work.
     """
     left, below, right, above = around
-    low, high = runs
-    count, within, levers = 0, swept.reach + widest, len(lever_x) > 0
-    while m < len(x) and count <= SIZE - RUN:
-        run = m // RUN
-        dx = max(left - high[run, 0], 0.0, low[run, 0] - right)
-        dz = max(below - high[run, 1], 0.0, low[run, 1] - above)
-        if dx * dx + dz * dz > within * within:
-            m += RUN
-            continue
-        n = min(RUN, len(x) - m)
-        if not _meet(x, z, margin, first_x, first_z, done, m, n, around, swept, some):
-            m += n
-            continue
-        for k in range(n):
-            # What is not wanted is written over by the next.
-            d[X + count], d[Z + count], place[count] = x[m], z[m], m
-            d[ORIGIN + count] = origin[m]
-            if levers:  # else margins are 0, as they are from the beginning
-                d[MARGIN + count] = margin[m]
-                d[LEVER_X + count], d[LEVER_Z + count] = lever_x[m], lever_z[m]
-            count += some[k]
-            m += 1
-    return count, m
-
-
-@njit(cache=True, nogil=True, _nrt=False, fastmath={"nnan", "nsz"})  # type: ignore[untyped-decorator]
-def _meet(
-    x: Array, z: Array, margin: Array, first_x: Array, first_z: Array, done: BoolArray, m: int,
-    n: int, around: tuple[float, float, float, float], swept: Swept, some: AnyArray,
-) -> bool:  # fmt: skip
-    """some: 1 for those of the rows m, m + 1, ... that `near_rows` wants, 0 for the others; whether
-    there are any.
-    """
-    if m < 0 or n > RUN:
-        return False
-    any_row = False
-    reach, (c1, s1, offset1), (c2, s2, offset2) = swept.reach, swept.ahead, swept.behind
+    n, count = runs.shape[1], 0
     for k in range(n):
+        dx = max(left - runs[2, k], runs[0, k] - right)
+        dz = max(below - runs[3, k], runs[1, k] - above)
+        dx, dz = max(dx, 0.0), max(dz, 0.0)
+        some[k] = dx * dx + dz * dz <= within * within
+    for k in range(n):
+        found[count] = k  # what is not wanted is written over by the next
+        count += some[k]
+    return count
+
+
+@njit(cache=True, nogil=True, _nrt=False)  # type: ignore[untyped-decorator]
+def near_rows(
+    rows: Array, found: IntArray, runs: int, at: int, around: tuple[float, float, float, float],
+    reach: float, swept: Swept, moves: bool, done: BoolArray, d: Array, place: IntArray,
+    some: AnyArray,
+) -> tuple[int, int]:  # fmt: skip
+    """Fill a batch with those rows of the runs from `at` on in which the body can meet what is
+    within the rectangle `around`, but for rows `done`: how many, and at which run to go on. moves:
+    whether pivots do; if not, margins are 0 in the batch already. some: (RUN,) room to work.
+    """
+    count = 0
+    while at < runs and count <= SIZE - RUN:
+        m = found[at] * RUN
+        at += 1
+        _meet(rows, m, around, reach, swept, some)
+        for k in range(RUN):
+            # What is not wanted is written over by the next.
+            d[X + count], d[Z + count], place[count] = rows[X_ROW, m], rows[Z_ROW, m], m
+            d[ORIGIN + count] = rows[ORIGIN_ROW, m]
+            if moves:
+                d[MARGIN + count] = rows[MARGIN_ROW, m]
+                d[LEVER_X + count] = rows[LEVER_X_ROW, m]
+                d[LEVER_Z + count] = rows[LEVER_Z_ROW, m]
+            count += some[k] & (not done[m])
+            m += 1
+    return count, at
+
+
+@njit(cache=True, nogil=True, _nrt=False)  # type: ignore[untyped-decorator]
+def _meet(
+    rows: Array, m: int, around: tuple[float, float, float, float], reach: float, swept: Swept,
+    some: AnyArray,
+) -> None:  # fmt: skip
+    """some: 1 for those of the run that begins at row m that `near_rows` wants, 0 for others."""
+    if m < 0:
+        return
+    c1, s1, offset1, c2, s2, offset2 = swept
+    for k in range(RUN):
         r = m + k
-        px, pz, more = x[r], z[r], max(margin[r], 0.0)
+        px, pz, more = rows[X_ROW, r], rows[Z_ROW, r], max(rows[MARGIN_ROW, r], 0.0)
         left, right, below, above = around[0] - px, around[2] - px, around[1] - pz, around[3] - pz
         dx, dz = max(max(left, -right), 0.0), max(max(below, -above), 0.0)
-        ux, uz = first_x[r], first_z[r]
+        ux, uz = rows[FIRST_X_ROW, r], rows[FIRST_Z_ROW, r]
         nx, nz = c1 * ux - s1 * uz, s1 * ux + c1 * uz
         ahead = min(nx * left, nx * right) + min(nz * below, nz * above) - offset1
         nx, nz = c2 * ux - s2 * uz, s2 * ux + c2 * uz
         behind = min(nx * left, nx * right) + min(nz * below, nz * above) - offset2
         near = reach + more
-        meet = (dx * dx + dz * dz <= near * near) & (max(ahead, behind) <= more)
-        meet &= not done[r]
-        some[k] = meet
-        any_row |= meet
-    return any_row
+        some[k] = (dx * dx + dz * dz <= near * near) & (max(ahead, behind) <= more)

@@ -53,16 +53,15 @@ def test_batch_is_the_same_as_row_by_row(
     words = (cells + 63) // 64
     full = np.packbits(np.arange(64 * words) < cells, bitorder="little").view(np.uint64)
     # Pivots that can be off by `margin` any way: what bends is all of it.
-    none, kind = np.zeros(0), int(np.sign(margin))
+    none, kind = np.zeros((0, 0)), int(np.sign(margin))
     level = Level(
-        kind, none, none, none, none, none, none, none, none, 0.0, 0.0, 0.0, 0.0, np.inf, turn,
-        step, cells, margin, none.reshape(0, 2), none.reshape(0, 2),
+        kind, 0, none, none, margin, 0.0, 0.0, 0.0, 0.0, np.inf, turn, step, cells
     )  # fmt: skip
     compared = blocked = 0
     for case in range(60):
         body, p = bodies(rng), polygon(rng, (0.05, 0.3, 0.9)[case % 3])
         b, count = case % BODIES, (SIZE, 5)[case % 2]
-        batch = new_batch(words, max(p.x.shape[1], body.radius.shape[1]))
+        batch = new_batch(words, max(p.x.shape[1], body.radius.shape[1]), 0)
         set_body(batch, body, b)
         set_polygon(batch, p, 0)
         x, z = rng.uniform(-1.2, 1.2, (2, count))
