@@ -204,7 +204,8 @@ def arcs(
         at, to = (low + _DROP_SINGLE) - _DROP_SINGLE, (high + _DROP_SINGLE) - _DROP_SINGLE
         s[FIRST + r] = at if at > low else at + _ONE
         s[LAST + r] = to if to < high else to - _ONE
-        s[DOUBT + r] = min(s[DOUBT + r], min(abs(low - at), abs(high - to)))
+        near = min(abs(low - at), abs(high - to)) if low - high < _HALF else _ONE  # or no arc
+        s[DOUBT + r] = min(s[DOUBT + r], near)
 
 
 @njit(cache=True, nogil=True, _nrt=False)  # type: ignore[untyped-decorator]
@@ -259,7 +260,8 @@ def between(
         at, to = (low + _DROP_SINGLE) - _DROP_SINGLE, (high + _DROP_SINGLE) - _DROP_SINGLE
         s[FIRST + r] = at if at > low else at + _ONE
         s[LAST + r] = to if to < high else to - _ONE
-        s[DOUBT + r] = min(s[DOUBT + r], min(abs(low - at), abs(high - to)))
+        near = min(abs(low - at), abs(high - to)) if low - high < _HALF else _ONE  # or no arc
+        s[DOUBT + r] = min(s[DOUBT + r], near)
 
 
 @njit(cache=True, nogil=True, _nrt=False)  # type: ignore[untyped-decorator]
