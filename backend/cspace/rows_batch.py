@@ -290,7 +290,7 @@ def _beyond_polygon(
             radius = shape[0, v]
             if highest <= -radius:
                 continue
-            before_line(d, s, n, radius)
+            before_line(d, s, n, radius, depth)
             away = _on_circle(shape[9, i] - shape[1, v] + math.pi, cells)
             _mark(s, w, n, BASE, away, cells, words, cells.again or highest >= 0.0)
         both(w, n, words)

@@ -150,13 +150,14 @@ def from_middle(d: Array, s: AnyArray, n: int, scale: float, period: float, midd
 
 
 @njit(cache=True, nogil=True, _nrt=False)  # type: ignore[untyped-decorator]
-def before_line(d: Array, s: AnyArray, n: int, radius: float) -> None:
-    """LEFT and RATIO of LINE and a corner at `radius`."""
+def before_line(d: Array, s: AnyArray, n: int, radius: float, limit: float) -> None:
+    """LEFT and RATIO of LINE and a corner at `radius`; at or over the limit, those of no arc."""
     if n > SIZE:
         return
     inverse = 1.0 / max(radius, 1e-300)
     for r in range(n):
-        t = d[LINE + r] * inverse
+        line = d[LINE + r]
+        t = line * inverse if line < limit else -2.0
         s[LEFT + r], s[RATIO + r] = 1.0 - abs(t), t
 
 
