@@ -107,16 +107,24 @@ def near_rows(
         at += 1
         _meet(rows, m, around, reach, swept, some)
         for k in range(RUN):
-            # What is not wanted is written over by the next.
-            d[X + count], d[Z + count], place[count] = rows[X_ROW, m], rows[Z_ROW, m], m
-            d[ORIGIN + count] = rows[ORIGIN_ROW, m]
-            if moves:
-                d[MARGIN + count] = rows[MARGIN_ROW, m]
-                d[LEVER_X + count] = rows[LEVER_X_ROW, m]
-                d[LEVER_Z + count] = rows[LEVER_Z_ROW, m]
-            count += some[k] & (not done[m])
-            m += 1
+            place[count] = m + k  # what is not wanted is written over by the next
+            count += some[k] & (not done[m + k])
+    _copy(rows, place, count, X_ROW, X, d)
+    _copy(rows, place, count, Z_ROW, Z, d)
+    _copy(rows, place, count, ORIGIN_ROW, ORIGIN, d)
+    if moves:
+        _copy(rows, place, count, MARGIN_ROW, MARGIN, d)
+        _copy(rows, place, count, LEVER_X_ROW, LEVER_X, d)
+        _copy(rows, place, count, LEVER_Z_ROW, LEVER_Z, d)
     return count, at
+
+
+@njit(cache=True, nogil=True, _nrt=False)  # type: ignore[untyped-decorator]
+def _copy(rows: Array, place: IntArray, count: int, value: int, begin: int, d: Array) -> None:
+    if begin < 0 or count > SIZE:
+        return
+    for r in range(count):
+        d[begin + r] = rows[value, place[r]]
 
 
 @njit(cache=True, nogil=True, _nrt=False)  # type: ignore[untyped-decorator]
