@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from backend.cspace.exact_levels import EXACT, RUN, Level
+from backend.cspace.exact_levels import EXACT, Level
 from backend.cspace.planar_arm import Profiles
 from backend.cspace.rows import ALL, SLACK, Polygons
 from backend.cspace.rows_angles import ERROR, HALF_TURN
@@ -73,8 +73,8 @@ class Batch(NamedTuple):
     """Rows of one body and one polygon, and room to work, see rows_vector: doubles d, singles s and
     words w. place: (SIZE,) which rows of the image they are; shape: (10, v) of the body its
     corners' radius and bearing, its edges' offset and normal, see Profiles; then of the polygon x,
-    z, normal_x, normal_z, offset, bearing, see Polygons. polar: (2, v), some and found: (runs,),
-    and room: (3, words) to work.
+    z, normal_x, normal_z, offset, bearing, see Polygons. polar: (2, v), some, found, order:
+    as many as rows or runs, and room: (3, words) to work.
     """
 
     d: Array
@@ -85,6 +85,7 @@ class Batch(NamedTuple):
     polar: Array
     some: AnyArray
     found: IntArray
+    order: IntArray
     room: AnyArray
 
 
@@ -106,8 +107,8 @@ def new_batch(words: int, corners: int, runs: int) -> Batch:
     return Batch(
         np.zeros(AWAY + corners * SIZE), np.empty(CORNERS + 2 * corners * SIZE, np.float32),
         np.empty(words * WORD, np.uint64), np.empty(SIZE, np.int64), np.empty((10, corners)),
-        np.empty((2, corners)), np.empty(max(runs, RUN), np.uint8), np.empty(runs, np.int64),
-        np.empty((3, words), np.uint64),
+        np.empty((2, corners)), np.empty(max(runs, SIZE), np.uint8), np.empty(runs, np.int64),
+        np.empty(SIZE, np.int64), np.empty((3, words), np.uint64),
     )  # fmt: skip
 
 
@@ -182,7 +183,19 @@ def touched_rows(
     fill(s, DOUBT, n, np.float32(math.inf))
     fill(d, NEAREST, n, math.inf)
     front = _beyond_polygon(sizes, cells, d, s, w, batch.shape, n)
-    count = _kept(d, s, w, batch.place, count, full, known, cells.close, cells.moves[0] != EXACT)
+    count = _kept(
+        d,
+        s,
+        w,
+        batch.place,
+        count,
+        full,
+        known,
+        cells.close,
+        cells.moves[0] != EXACT,
+        batch.order,
+        batch.some,
+    )
     if count == 0:
         return 0
     _beyond_body(sizes, cells, d, s, w, batch.shape, _fill(d, count), front)
@@ -209,26 +222,42 @@ def _kept(
     known: AnyArray,
     close: float,
     moves: bool,
+    order: IntArray,
+    some: AnyArray,
 ) -> int:
     """Move the rows in which more than `known` may be blocked to the front; how many. moves: their
-    pivots do.
+    pivots do. order, some: (SIZE,) room to work.
     """
     words, kept = len(full), 0
     for r in range(count):
-        some, m = s[DOUBT + r] < close, place[r]
-        for word in range(words):
-            some |= w[word * WORD + BLOCKED + r] & full[word] & ~known[m, word] != 0
-        # What is not kept is written over by the next.
-        for value in (X, Z, ORIGIN, NEAREST):
-            d[value + kept] = d[value + r]
-        if moves:
-            for value in (MARGIN, LEVER_X, LEVER_Z):
-                d[value + kept] = d[value + r]
-        s[DOUBT + kept], place[kept] = s[DOUBT + r], m
-        for word in range(words):
-            w[word * WORD + BLOCKED + kept] = w[word * WORD + BLOCKED + r]
-        kept += 1 if some else 0
+        some[r] = s[DOUBT + r] < close
+    for word in range(words):
+        bits = full[word]
+        for r in range(count):
+            some[r] |= w[word * WORD + BLOCKED + r] & bits & ~known[place[r], word] != 0
+    for r in range(count):
+        order[kept] = r  # what is not kept is written over by the next
+        kept += some[r]
+    if kept == count:
+        return kept
+    for value in (X, Z, ORIGIN, NEAREST):
+        _move(d, value, order, kept)
+    if moves:
+        for value in (MARGIN, LEVER_X, LEVER_Z):
+            _move(d, value, order, kept)
+    for word in range(words):
+        _move(w, word * WORD + BLOCKED, order, kept)
+    _move(s, DOUBT, order, kept)
+    _move(place, 0, order, kept)
     return kept
+
+
+@njit(cache=True, nogil=True, _nrt=False)  # type: ignore[untyped-decorator]
+def _move(values: AnyArray, begin: int, order: IntArray, n: int) -> None:
+    if begin < 0 or n > SIZE:
+        return
+    for r in range(n):
+        values[begin + r] = values[begin + order[r]]
 
 
 @njit(cache=True, nogil=True, _nrt=False)  # type: ignore[untyped-decorator]
