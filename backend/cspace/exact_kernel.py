@@ -244,7 +244,8 @@ def batch_of(body: Profiles, axes: Array) -> Batch:
     for joint in range(1, 4):
         words = max(words, (int(axes[joint, COUNT]) + 63) // 64)
     rows = int(axes[1, COUNT]) * int(axes[2, COUNT])
-    return new_batch(words, max(_USUAL, body.radius.shape[1]), rows // RUN + 1)
+    batch: Batch = new_batch(words, max(_USUAL, body.radius.shape[1]), rows // RUN + 1)
+    return batch
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]

@@ -32,10 +32,10 @@ class Level(NamedTuple):
     """The rows of one joint: for the boom 1, for the stick one for each cell of the boom, for the
     bucket one for each cell of boom and stick.
 
-    kind: EXACT, OUTER, INNER; count: rows m; rows: (8, p) their values, see X_ROW, in runs of RUN,
-    those behind the last one far from everything; runs: (4, p / RUN) left, below, right and above
-    bounds of the pivots of each run; widest: the largest margin, at least 0 [m]. turn: how far the
-    angle can be from its cell's, below 0 for INNER [rad]; step, cells: of the rows.
+    kind: EXACT, OUTER, INNER; rows: (8, p) their values, see X_ROW, in runs of RUN, those behind
+    the last one far from everything; runs: (4, p / RUN) left, below, right and above bounds of the
+    pivots of each run; widest: the largest margin, at least 0 [m]. turn: how far the angle can be
+    from its cell's, below 0 for INNER [rad]; step, cells: of the rows.
 
     Along one direction a pivot moves less than in all: the boom turns it by up to `boom` about
     (boom_x, boom_z), the stick by up to `stick` about the point behind it; bend: what the paths'
@@ -43,7 +43,6 @@ class Level(NamedTuple):
     """
 
     kind: int
-    count: int
     rows: Array
     runs: Array
     widest: float
@@ -118,15 +117,15 @@ def levels(links: Array, axes: Array, kind: int) -> tuple[Level, Level, Level]:
     turn3 = kind * (half1 + half2 + half3 + ROUNDING)
     return (
         Level(
-            kind, 1, rows0, runs0, widest0, ox, oz, 0.0, 0.0, ROUNDING,
+            kind, rows0, runs0, widest0, ox, oz, 0.0, 0.0, ROUNDING,
             turn1, axes[1, STEP], n1,
         ),
         Level(
-            kind, n1, rows1, runs1, widest1, ox, oz, half1, 0.0, bend1,
+            kind, rows1, runs1, widest1, ox, oz, half1, 0.0, bend1,
             turn2, axes[2, STEP], n2,
         ),
         Level(
-            kind, n1 * n2, rows2, runs2, widest2, ox, oz, half1, half2, bend2,
+            kind, rows2, runs2, widest2, ox, oz, half1, half2, bend2,
             turn3, axes[3, STEP], int(axes[3, COUNT]),
         ),
     )  # fmt: skip

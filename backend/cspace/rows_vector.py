@@ -6,6 +6,10 @@ an array takes longer than what is done with them. So all a batch needs lies in 
 row in each at a place known beforehand. Single precision, which does twice as many at once, for
 everything but where rounding would spoil the ends of arcs.
 
+Rows' kernels make no arrays and keep none: without numba's runtime (_nrt) they do not count who
+uses those that they are given. What they call is compiled without it, too, unless it says that it
+needs it.
+
 The checks that loops begin with never fail: n is at most SIZE, and polygons have far fewer corners.
 They tell the compiler that no index is below 0, which it would test for every value.
 

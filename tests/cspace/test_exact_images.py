@@ -9,12 +9,15 @@ import pytest
 from exact_scenes import NAMES, coal_touches, judged, machine_named, scene
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numba import njit
 
 from backend.cspace import exact, joint_image, planar_arm
 from backend.cspace.rows_angles import ERROR, arc_cosine, bearing
+from backend.cspace.rows_vector import FUSED
 from backend.machine.kinematics import body_boxes, link_poses
 from backend.machine.model import Machine
 from backend.spatial.boxes import Boxes
+from backend.spatial.types import AnyArray
 
 SHAPE = (36, 20, 22, 70)
 
@@ -149,3 +152,24 @@ def test_quick_angles_are_as_good_as_they_say(left: float, x: float, z: float) -
     assert abs(arc - 2.0 * np.arcsin(np.sqrt(0.5 * left))) < 0.3 * ERROR
     off = bearing(np.float32(x), np.float32(z)) - np.arctan2(z, x + 0.0)
     assert abs((off + np.pi) % (2.0 * np.pi) - np.pi) < 0.3 * ERROR
+
+
+@njit(fastmath=FUSED)  # type: ignore[untyped-decorator]
+def fused(left: AnyArray, x: AnyArray, z: AnyArray) -> tuple[AnyArray, AnyArray]:
+    arcs, bearings = np.empty_like(left), np.empty_like(x)
+    for k in range(len(left)):
+        arcs[k] = arc_cosine(left[k])
+        bearings[k] = bearing(x[k], z[k])
+    return arcs, bearings
+
+
+def test_quick_angles_are_as_good_where_products_and_sums_are_fused() -> None:
+    rng = np.random.default_rng(5)
+    n = 1_000_000
+    left = np.concatenate([rng.uniform(0.0, 1.0, n), 10.0 ** rng.uniform(-30.0, 0.0, n)])
+    x, z = rng.uniform(-9.0, 9.0, (2, 2 * n)) * 10.0 ** rng.integers(-4, 1, (2, 2 * n))
+    left, x, z = (values.astype(np.float32) for values in (left, x, z))
+    arcs, bearings = fused(left, x, z)
+    assert np.abs(arcs - 2.0 * np.arcsin(np.sqrt(0.5 * left.astype(float)))).max() < 0.3 * ERROR
+    off = bearings - np.arctan2(z.astype(float), x.astype(float))
+    assert np.abs((off + np.pi) % (2.0 * np.pi) - np.pi).max() < 0.3 * ERROR

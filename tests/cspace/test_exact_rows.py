@@ -55,7 +55,7 @@ def test_batch_is_the_same_as_row_by_row(
     # Pivots that can be off by `margin` any way: what bends is all of it.
     none, kind = np.zeros((0, 0)), int(np.sign(margin))
     level = Level(
-        kind, 0, none, none, margin, 0.0, 0.0, 0.0, 0.0, np.inf, turn, step, cells
+        kind, none, none, margin, 0.0, 0.0, 0.0, 0.0, np.inf, turn, step, cells
     )  # fmt: skip
     compared = blocked = 0
     for case in range(60):
