@@ -277,10 +277,8 @@ def swing_block(
     full1, full2, full3 = full_words(boom.cells), full_words(stick.cells), full_words(bucket.cells)
     row1, done1 = np.zeros((1, len(full1)), np.uint64), np.zeros(boom.rows.shape[1], np.bool_)
     _rows(chain, 0, body, polygons, pairs, boxes, boom, swept, done1, batch, full1, row1)
-    rows2, done2 = (
-        np.zeros((boom.cells, len(full2)), np.uint64),
-        np.zeros(stick.rows.shape[1], np.bool_),
-    )
+    rows2 = np.zeros((boom.cells, len(full2)), np.uint64)
+    done2 = np.zeros(stick.rows.shape[1], np.bool_)
     _pass_on(row1[0], boom.cells, 1, full2, done2, rows2)
     _rows(chain, 1, body, polygons, pairs, boxes, stick, swept, done2, batch, full2, rows2)
     done3 = np.zeros(bucket.rows.shape[1], np.bool_)

@@ -184,18 +184,9 @@ def touched_rows(
     fill(d, NEAREST, n, math.inf)
     front = _beyond_polygon(sizes, cells, d, s, w, batch.shape, n)
     count = _kept(
-        d,
-        s,
-        w,
-        batch.place,
-        count,
-        full,
-        known,
-        cells.close,
-        cells.moves[0] != EXACT,
-        batch.order,
-        batch.some,
-    )
+        d, s, w, batch.place, count, full, known, cells.close, cells.moves[0] != EXACT,
+        batch.order, batch.some,
+    )  # fmt: skip
     if count == 0:
         return 0
     _beyond_body(sizes, cells, d, s, w, batch.shape, _fill(d, count), front)
@@ -213,18 +204,9 @@ def touched_rows(
 
 @njit(cache=True, nogil=True, _nrt=False)  # type: ignore[untyped-decorator]
 def _kept(
-    d: Array,
-    s: AnyArray,
-    w: AnyArray,
-    place: IntArray,
-    count: int,
-    full: AnyArray,
-    known: AnyArray,
-    close: float,
-    moves: bool,
-    order: IntArray,
-    some: AnyArray,
-) -> int:
+    d: Array, s: AnyArray, w: AnyArray, place: IntArray, count: int, full: AnyArray,
+    known: AnyArray, close: float, moves: bool, order: IntArray, some: AnyArray,
+) -> int:  # fmt: skip
     """Move the rows in which more than `known` may be blocked to the front; how many. moves: their
     pivots do. order, some: (SIZE,) room to work.
     """

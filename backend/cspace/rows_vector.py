@@ -209,7 +209,8 @@ def arcs(
         at, to = (low + _DROP_SINGLE) - _DROP_SINGLE, (high + _DROP_SINGLE) - _DROP_SINGLE
         s[FIRST + r] = at if at > low else at + _ONE
         s[LAST + r] = to if to < high else to - _ONE
-        near = min(abs(low - at), abs(high - to)) if low - high < _HALF else _ONE  # or no arc
+        # What is surely no arc has no ends.
+        near = min(abs(low - at), abs(high - to)) if low - high < _HALF else _ONE
         s[DOUBT + r] = min(s[DOUBT + r], near)
 
 
@@ -265,7 +266,8 @@ def between(
         at, to = (low + _DROP_SINGLE) - _DROP_SINGLE, (high + _DROP_SINGLE) - _DROP_SINGLE
         s[FIRST + r] = at if at > low else at + _ONE
         s[LAST + r] = to if to < high else to - _ONE
-        near = min(abs(low - at), abs(high - to)) if low - high < _HALF else _ONE  # or no arc
+        # What is surely no arc has no ends.
+        near = min(abs(low - at), abs(high - to)) if low - high < _HALF else _ONE
         s[DOUBT + r] = min(s[DOUBT + r], near)
 
 
