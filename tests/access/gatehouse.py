@@ -126,20 +126,29 @@ class House:
         who: str | None = None,
         origin: str | None = "here",
         token: str | None = None,
-        **more: Any,
     ) -> ClientConnection:
         """A websocket of somebody's new session, or of the one that has this token."""
+        return connect(**self.handshake(path, who, origin, token))
+
+    def handshake(
+        self,
+        path: str,
+        who: str | None = None,
+        origin: str | None = "here",
+        token: str | None = None,
+    ) -> dict[str, Any]:
+        """What a websocket client is given to open such a one."""
         token = self.token(who) if who is not None else token
-        headers = {} if token is None else {"Cookie": f"{self.access.cookie}={token}"}
-        return connect(
-            self.url.replace("http", "ws", 1) + path,
-            origin=self.url if origin == "here" else origin,  # type: ignore[arg-type]
-            subprotocols=[PROTOCOL] if path.startswith("/view") else None,
-            additional_headers=headers,
-            proxy=None,
-            max_size=None,
-            **more,
-        )
+        return {
+            "uri": self.url.replace("http", "ws", 1) + path,
+            "origin": self.url if origin == "here" else origin,
+            "subprotocols": [PROTOCOL] if path.startswith("/view") else None,
+            "additional_headers": {}
+            if token is None
+            else {"Cookie": f"{self.access.cookie}={token}"},
+            "proxy": None,
+            "max_size": None,
+        }
 
 
 def make_users(folder: Path) -> Path:
