@@ -1,7 +1,7 @@
 """A long search for the boxes of one link, for a sidecar: annealing, then polishing, many times.
 
-`fitting` finds good boxes in a minute or two; this looks for as long as it is told to, also from
-the best found so far.
+`fitting` finds good boxes in a minute or two; this looks for as long as it is told to. Every other
+time it chooses some of the best known boxes anew.
 """
 
 from __future__ import annotations
@@ -14,7 +14,8 @@ from scipy.spatial import cKDTree
 
 from backend.machine.anneal_kernels import UNIT
 from backend.machine.anneal_loop import anneal
-from backend.machine.fitting import PAD, farthest, grown, mesh_tree, outer_points
+from backend.machine.columns import EDGE, Chosen, Room
+from backend.machine.fitting import PAD, farthest, grown, mesh_tree, outer_points, surface_points
 from backend.machine.fitting_clip import extremes, outside_box, subdivided, thin
 from backend.machine.fitting_field import Field, distance_field, room
 from backend.machine.polish import Set, polished
@@ -24,13 +25,16 @@ from backend.spatial.types import Array
 
 MOVES = 220_000  # of one annealing
 _STAGES = 10  # between which points that stayed outside join those that are looked at
-_HOT, _WARM, _COLD = 1.2, 0.3, 0.006  # temperatures: at first, from a known solution, at last
+_HOT, _COLD = 1.2, 0.006  # temperatures: at first, at last
 _PRICES = (600.0, 1500.0)  # of a cubic metre sticking out: at first, at last
 _SPACINGS = (0.06, 0.04)  # [m] at which surfaces are looked at: at first, at last
 _FIRST_CELL = 0.6  # [m] cubes whose outermost points are looked at first
 _FINE = 0.015  # [m] size of triangles over which boxes grow in the end
 _DIGITS = 2e-4  # [m] boxes are larger by, for the rounding in a sidecar
 _BELOW = 0.02  # [m] aimed below the best so far where `wanted` is out of reach
+RENEWALS = 12  # choices of a few boxes anew
+_CHECKS = 4  # looks at what points and grids do not tell, after each of which boxes change
+_LOOKED_AT = 6_000  # points at most, to begin with, when choosing boxes anew
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,11 +64,11 @@ def long_fit(
 ) -> tuple[Boxes, float]:
     """(boxes that contain all triangles (n, 3, 3) [m], their excess [m] as `fitting.excess`).
 
-    At most `starts` annealings, ended by the first that comes within `wanted` [m]; every other one
-    begins at the best known boxes, the rest anywhere. begin: boxes to improve on; they count only
-    if they contain the mesh. progress: called with the share done and the best excess so far.
-    Centres, angles and half extents have the digits of a sidecar. Deterministic. Raises ValueError
-    for an empty or non-finite set.
+    At most `starts` searches, ended by the first that comes within `wanted` [m]: of the best known
+    boxes a few are chosen anew, and every other time all are annealed from anywhere.
+    begin: boxes to improve on; they count only if they contain the mesh. progress: called with the
+    share done and the best excess so far. Centres, angles and half extents have the digits of a
+    sidecar. Deterministic. Raises ValueError for an empty or non-finite set.
     """
     triangles = np.asarray(triangles, dtype=float)
     if triangles.ndim != 3 or triangles.shape[1:] != (3, 3) or not len(triangles):
@@ -78,15 +82,19 @@ def long_fit(
         begin = boxes_of(tables_of(begin))
         if left_out(begin, triangles)[0] == 0.0:
             best, least = begin, farthest(begin, link.tree, 0.03)
+    renewal: Renewal | None = None
     for start in range(starts):
         report(start / starts, least)
         if least <= wanted:
             break
-        rng = np.random.default_rng(seed + start)
-        known = best is not None and start % 2 == 0
-        boxes = _as_set(best) if known and best is not None else spread(link, max_boxes, rng)
         aim = max(wanted, least - _BELOW) if np.isfinite(least) else 1.2 * wanted
-        boxes = annealed(link, boxes, aim, _WARM if known else _HOT, seed + start)
+        if best is not None and start % 2 == 0:
+            if renewal is None or renewal.boxes is not best:
+                renewal = Renewal(link, best, aim, seed + start)
+            boxes = renewal.improved()
+        else:
+            rng = np.random.default_rng(seed + start)
+            boxes = annealed(link, spread(link, max_boxes, rng), aim, _HOT, seed + start)
         found, value = _closed(link, boxes, max(wanted - 0.002, aim - _BELOW))
         if value < least:
             best, least = found, value
@@ -141,6 +149,49 @@ def annealed(link: Link, boxes: Set, tolerance: float, hot: float, seed: int) ->
     return boxes
 
 
+class Renewal:
+    """Known boxes, of which a few at a time are chosen anew to come within `aim` [m]."""
+
+    def __init__(self, link: Link, boxes: Boxes, aim: float, seed: int) -> None:
+        self.boxes, self._link = boxes, link
+        self._tolerance = aim - EDGE
+        space, pockets = room(link.distance, self._tolerance)
+        self._pockets = thin(pockets, 0.05)
+        cell = 0.1
+        while len(some := extremes(link.points, cell)) > _LOOKED_AT:
+            cell *= 1.25
+        some = np.concatenate([some, thin(pockets, 0.15)])
+        self._room = Room.of(space, self._tolerance)
+        begin = Set(boxes.rotations, boxes.centers, boxes.half_extents)
+        self._chosen = Chosen(some, self._room, begin, seed)
+
+    def improved(self, report: Callable[[int], None] | None = None) -> Set:
+        """The boxes after some choices; points may be left out."""
+        for _ in range(_CHECKS):
+            if self._chosen.improve(RENEWALS, report) or not self._corrected():
+                break
+        return self._chosen.as_set()
+
+    def _corrected(self) -> bool:
+        """Look closely: whether the boxes leave out parts of triangles, or stick out between the
+        grid's nodes. What does counts from now on."""
+        boxes = self._chosen.as_set()
+        at = surface_points(Boxes(boxes.c, boxes.R, boxes.h), 0.03)
+        away = self._link.tree.query(at)[0]
+        beyond = away > self._tolerance + UNIT
+        self._room.forbid(at[beyond], away[beyond] - self._tolerance)
+        self._chosen.draw_in()
+        boxes = self._chosen.as_set()
+        rest = self._link.triangles
+        for R, c, h in zip(boxes.R, boxes.c, boxes.h, strict=True):
+            rest = outside_box(rest, R, R.T @ c - h, R.T @ c + h)
+        points = np.concatenate([subdivided(rest, _FINE).reshape(-1, 3), self._pockets])
+        away = boxes.away(points).min(axis=0)
+        order = np.argsort(-away, kind="stable")[: np.count_nonzero(away > EDGE)]
+        self._chosen.look_at(thin(points[order], 0.03))
+        return bool(beyond.any() or len(order))
+
+
 def _closed(link: Link, boxes: Set, wanted: float) -> tuple[Boxes, float]:
     """The boxes, polished where that helps, grown over what they left out; their excess [m]."""
     space, pockets = room(link.distance, wanted)
@@ -166,7 +217,3 @@ def _closed(link: Link, boxes: Set, wanted: float) -> tuple[Boxes, float]:
         points = np.concatenate([points, thin(subdivided(rest, _FINE).reshape(-1, 3), 0.01)])
     assert best is not None
     return best
-
-
-def _as_set(boxes: Boxes) -> Set:
-    return Set(boxes.rotations, boxes.centers, boxes.half_extents)
