@@ -25,7 +25,7 @@ from backend.machine.polish import Set
 from backend.spatial.types import AnyArray, Array, BoolArray, IntArray
 
 EDGE = 0.002  # [m] a point so little outside is not left out: boxes grow over it in the end
-_SPACING = 0.04  # [m] at which surfaces are looked at
+_SPACING = 0.025  # [m] at which surfaces are looked at
 _SMALL = 0.02  # [m] half extents of a box that begins at a point
 _MOST = 4  # boxes taken away at once, at most
 _ROUNDS, _TRIES = (10, 22), 8  # of the linear program, at least and at most; new boxes in each
@@ -51,9 +51,9 @@ class Room:
         above = np.clip(np.rint((space.values - tolerance) / UNIT), -127, 127)
         return cls(above.astype(np.int8), space.origin, space.step)
 
-    def forbid(self, points: Array, beyond: Array) -> None:
-        """Points (n, 3) of which the grid says too little: they are `beyond` (n,) [m] the
-        tolerance."""
+    def forbid(self, points: Array, beyond: Array) -> bool:
+        """Points (n, 3) that are `beyond` (n,) [m] the tolerance; whether the grid did not say so
+        before."""
         size = np.array(self.field.shape)
         at = np.clip((points - self.origin) / self.step, 0.0, size - 1.0)
         low = np.clip(np.floor(at).astype(np.intp), 0, size - 2)
@@ -64,6 +64,7 @@ class Room:
         missing = np.ceil(np.maximum(beyond / UNIT - told, 0.0))
         raised = np.minimum(self.field[index] + missing[:, None], 127).astype(np.int8)
         np.maximum.at(self.field, index, raised)
+        return bool(missing.any())
 
 
 class Chosen:
@@ -95,10 +96,12 @@ class Chosen:
     def draw_in(self) -> None:
         """Draw the boxes in where they stick out of the room, which may have become smaller."""
         worth = np.full(len(self.points), 1e-3)
-        self.boxes, boxes = [], self.boxes
-        for box in boxes:
-            some = drawn_in(self.points, worth, *self._room(), *box) >= 0.0
-            self.boxes.append(box if some else self._anywhere(self.points))
+
+        def fits(box: Box) -> bool:
+            return bool(drawn_in(self.points, worth, *self._room(), *box) >= 0.0)
+
+        self.boxes = [box if fits(box) else self._anywhere(self.points) for box in self.boxes]
+        self._earlier = [box for box in self._earlier if fits(box)]
 
     def look_at(self, points: Array) -> None:
         """Points (m, 3) [m] that count from now on as well."""

@@ -33,6 +33,7 @@ _FINE = 0.015  # [m] size of triangles over which boxes grow in the end
 _DIGITS = 2e-4  # [m] boxes are larger by, for the rounding in a sidecar
 _BELOW = 0.02  # [m] aimed below the best so far where `wanted` is out of reach
 RENEWALS = 12  # choices of a few boxes anew
+_NEAR = 0.03  # [m] around the tolerance, where distances are measured
 _CHECKS = 4  # looks at what points and grids do not tell, after each of which boxes change
 _LOOKED_AT = 6_000  # points at most, to begin with, when choosing boxes anew
 
@@ -49,7 +50,7 @@ class Link:
     @classmethod
     def of(cls, triangles: Array) -> Link:
         """Of triangles (n, 3, 3) [m]."""
-        field = distance_field(triangles, margin=0.25, step=0.022)
+        field = distance_field(triangles, margin=0.35, step=0.022)
         return cls(triangles, outer_points(triangles), field, mesh_tree(triangles))
 
 
@@ -155,13 +156,14 @@ class Renewal:
     def __init__(self, link: Link, boxes: Boxes, aim: float, seed: int) -> None:
         self.boxes, self._link = boxes, link
         self._tolerance = aim - EDGE
-        space, pockets = room(link.distance, self._tolerance)
+        space, pockets = room(_measured(link, self._tolerance), self._tolerance)
         self._pockets = thin(pockets, 0.05)
         cell = 0.1
         while len(some := extremes(link.points, cell)) > _LOOKED_AT:
             cell *= 1.25
         some = np.concatenate([some, thin(pockets, 0.15)])
         self._room = Room.of(space, self._tolerance)
+        self._room.forbid(*_between_nodes(link, space, self._tolerance))
         begin = Set(boxes.rotations, boxes.centers, boxes.half_extents)
         self._chosen = Chosen(some, self._room, begin, seed)
 
@@ -177,9 +179,9 @@ class Renewal:
         grid's nodes. What does counts from now on."""
         boxes = self._chosen.as_set()
         at = surface_points(Boxes(boxes.c, boxes.R, boxes.h), 0.03)
-        away = self._link.tree.query(at)[0]
+        away = np.asarray(self._link.tree.query(at)[0])
         beyond = away > self._tolerance + UNIT
-        self._room.forbid(at[beyond], away[beyond] - self._tolerance)
+        unknown = self._room.forbid(at[beyond], away[beyond] - self._tolerance)
         self._chosen.draw_in()
         boxes = self._chosen.as_set()
         rest = self._link.triangles
@@ -189,7 +191,34 @@ class Renewal:
         away = boxes.away(points).min(axis=0)
         order = np.argsort(-away, kind="stable")[: np.count_nonzero(away > EDGE)]
         self._chosen.look_at(thin(points[order], 0.03))
-        return bool(beyond.any() or len(order))
+        return unknown or bool(len(order))
+
+
+def _measured(link: Link, tolerance: float) -> Field:
+    """The link's field with the distances near `tolerance` [m] measured, not estimated."""
+    values = link.distance.values.copy()
+    near = np.abs(values - tolerance) < _NEAR
+    at = link.distance.origin + link.distance.step * np.argwhere(near)
+    values[near] = link.tree.query(at)[0]
+    return Field(link.distance.origin, link.distance.step, values)
+
+
+def _between_nodes(link: Link, space: Field, tolerance: float) -> tuple[Array, Array]:
+    """The middles of the grid's cells (n, 3) [m] that are beyond `tolerance`, and how far (n,) [m].
+
+    Cells with nodes in pockets are left out: those may be filled.
+    """
+    low = np.full(np.array(space.values.shape) - 1, np.inf)
+    high = -low
+    size = low.shape
+    for i, j, k in np.ndindex(2, 2, 2):
+        part = space.values[i : i + size[0], j : j + size[1], k : k + size[2]]
+        low, high = np.minimum(low, part), np.maximum(high, part)
+    at = space.origin + space.step * (
+        np.argwhere((low > tolerance - _NEAR) & (low <= tolerance) & (high > tolerance)) + 0.5
+    )
+    beyond = np.asarray(link.tree.query(at)[0]) - tolerance
+    return at[beyond > 0.0], beyond[beyond > 0.0]
 
 
 def _closed(link: Link, boxes: Set, wanted: float) -> tuple[Boxes, float]:

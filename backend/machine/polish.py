@@ -173,6 +173,8 @@ def _near(rows: _Rows, boxes: Set, room: Field, above: float, spacing: float, ea
     q, at, owner = boxes.surface(spacing)
     value = _values(room, at)
     some = np.flatnonzero(value > above)
+    if not len(some):
+        return
     some = some[_tightest(at[some], value[some], _THIN, owner[some])]
     q, at, owner, value = q[some], at[some], owner[some], value[some]
     steps = room.step * np.eye(3)

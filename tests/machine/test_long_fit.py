@@ -15,7 +15,7 @@ from backend.machine.anneal_kernels import UNIT, outside, sticking_out
 from backend.machine.fitting import excess
 from backend.machine.fitting_field import distance_field, room
 from backend.machine.load import load_machine
-from backend.machine.long_fit import Link, annealed, long_fit, spread
+from backend.machine.long_fit import Link, Renewal, annealed, long_fit, spread
 from backend.machine.polish import Set, polished
 from backend.machine.sidecar import Sidecar
 from backend.machine.stated import as_toml, left_out, tables_of
@@ -37,6 +37,7 @@ L_SHAPE = bars(((2.0, 0.4, 0.4), (1.0, 0.0, 0.0)), ((0.4, 0.4, 1.6), (0.2, 0.0, 
 @pytest.fixture(autouse=True)
 def short(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(searching, "MOVES", 20_000)
+    monkeypatch.setattr(searching, "RENEWALS", 4)
 
 
 def test_how_far_points_are_outside() -> None:
@@ -81,10 +82,36 @@ def test_polishing_brings_shifted_boxes_back_over_the_mesh() -> None:
     assert excess(full, L_SHAPE) < 0.6 * excess(Boxes(boxes.c, boxes.R, boxes.h), L_SHAPE)
 
 
+def test_boxes_that_are_near_enough_are_left_as_they_are_by_polishing() -> None:
+    link = Link.of(L_SHAPE)
+    space, _ = room(link.distance, 0.3)
+    box = Set(np.eye(3)[None], np.array([[1.0, 0.0, 0.0]]), np.array([[1.0, 0.2, 0.2]]))
+    some = link.points[link.points[:, 2] < 0.19]
+    again = polished(box, some, space, 0.3, 3)
+    assert again.away(some).max() < 1e-3
+    far = Set(box.R, box.c, 0.3 * box.h)  # nothing of it is near what is forbidden
+    assert polished(far, some, space, 0.3, 3).away(some).max() < far.away(some).max()
+
+
 def test_annealing_finds_the_two_bars_from_anywhere() -> None:
     link = Link.of(L_SHAPE)
     boxes = annealed(link, spread(link, 2, np.random.default_rng(1)), 0.1, 1.2, 1)
     assert boxes.away(link.points).min(axis=0).max() < 0.02
+
+
+def test_renewed_boxes_keep_within_what_is_aimed_at_and_leave_nothing_out() -> None:
+    link = Link.of(L_SHAPE)
+    turn = about_axis(np.array([0.0, 0.0, 1.0]), 0.05)
+    boxes = Boxes(
+        np.array([[1.02, 0.03, 0.02], [0.24, 0.0, 0.85]]),
+        np.stack([turn, np.eye(3)]),
+        np.array([[1.1, 0.4, 0.4], [0.3, 0.25, 1.1]]),
+    )
+    assert excess(boxes, L_SHAPE) > 0.3
+    better = Renewal(link, boxes, 0.06, 1).improved()
+    full = Boxes(better.c, better.R, better.h + 3e-3)
+    assert left_out(full, L_SHAPE)[0] == 0.0
+    assert excess(full, L_SHAPE) < 0.07
 
 
 def test_a_long_fit_contains_everything_is_near_and_deterministic() -> None:
