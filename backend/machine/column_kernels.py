@@ -64,7 +64,7 @@ def drawn_in(
     out = sticking_out(field, origin, step, spacing, R, c, h, 1e9)
     for _ in range(_SHRINKS):
         if out <= 0.0:
-            return holds
+            return float(holds)
         best, best_a, best_sign, best_by = -1e18, 0, 1.0, 0.0
         for k in range(12):
             a, sign, by = k % 3, (-1.0 if k // 3 % 2 else 1.0), (0.01 if k < 6 else 0.04)

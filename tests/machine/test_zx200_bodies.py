@@ -24,7 +24,7 @@ from backend.machine.sweeps import cylinders_of, swept_by_cylinders
 from backend.spatial.boxes import Boxes
 from backend.spatial.types import Array
 
-STATED = {"bucket": 0.15, "stick": 0.15, "boom": 0.185, "tracks": 0.215, "upper": 0.31}
+STATED = {"bucket": 0.15, "stick": 0.15, "boom": 0.185, "tracks": 0.215, "upper": 0.3}
 """Largest excess over the meshes [m], rounded in the README; 0.15 m is what is wanted of all."""
 
 
