@@ -32,6 +32,7 @@ _FIRST_CELL = 0.6  # [m] cubes whose outermost points are looked at first
 _FINE = 0.015  # [m] size of triangles over which boxes grow in the end
 _DIGITS = 2e-4  # [m] boxes are larger by, for the rounding in a sidecar
 _BELOW = 0.02  # [m] aimed below the best so far where `wanted` is out of reach
+_RENEWED_BELOW = 0.01  # [m] the same when choosing boxes anew; half of it is lost in closing gaps
 RENEWALS = 12  # choices of a few boxes anew
 _NEAR = 0.03  # [m] around the tolerance, where distances are measured
 _CHECKS = 4  # looks at what points and grids do not tell, after each of which boxes change
@@ -90,7 +91,8 @@ def long_fit(
             break
         aim = max(wanted, least - _BELOW) if np.isfinite(least) else 1.2 * wanted
         if best is not None and start % 2 == 0:
-            if renewal is None or renewal.boxes is not best:
+            if renewal is None or renewal.ended or renewal.boxes is not best:
+                aim = max(wanted, least - _RENEWED_BELOW)
                 renewal = Renewal(link, best, aim, seed + start)
             boxes = renewal.improved()
         else:
@@ -155,6 +157,7 @@ class Renewal:
 
     def __init__(self, link: Link, boxes: Boxes, aim: float, seed: int) -> None:
         self.boxes, self._link = boxes, link
+        self.ended = False  # no more to improve
         self._tolerance = aim - EDGE
         space, pockets = room(_measured(link, self._tolerance), self._tolerance)
         self._pockets = thin(pockets, 0.05)
@@ -170,7 +173,10 @@ class Renewal:
     def improved(self, report: Callable[[int], None] | None = None) -> Set:
         """The boxes after some choices; points may be left out."""
         for _ in range(_CHECKS):
-            if self._chosen.improve(RENEWALS, report) or not self._corrected():
+            if self._chosen.improve(RENEWALS, report):
+                break
+            self.ended = not self._corrected()
+            if self.ended:
                 break
         return self._chosen.as_set()
 
